@@ -27,7 +27,6 @@ from modt.segmentation.native_kernels import NativeKernels
 from modt.segmentation.segmenter import Segmenter
 from modt.segmentation.tuning import SegmentationTuning
 from modt.tracking.extent import extent_update_of
-from modt.tracking.kalman import filter_of
 from modt.tracking.sight import sight_of
 from modt.tracking.states import ACCURATE
 from modt.tracking.tracker import Tracker
@@ -294,25 +293,6 @@ PASSES = {
 def test_passes_on_random_input(kernels, name, arguments, seed, n):
     given = arguments(np.random.default_rng(seed), n)
     assert same(*(getattr(each, name)(*given) for each in (NUMPY, kernels)))
-
-
-@given(seed=SEEDS, m=st.integers(0, 9), dt_s=st.sampled_from([0.0, 0.1, 3.0]))
-@settings(max_examples=100, deadline=None)
-def test_filter(kernels, seed, m, dt_s):
-    rng = np.random.default_rng(seed)
-    x, A = rng.normal(0, 5, (m, 4)), rng.normal(0, 1, (m, 4, 4))
-    x[:, 2] *= rng.choice([0.1, 1.0, 1e6])  # headings that turned many times
-    rows = np.sort(rng.permutation(m)[: rng.integers(0, m + 1)])
-    z, R = x[rows, :2] + rng.normal(0, 1, (len(rows), 2)), np.tile(0.1 * np.eye(2), (len(rows), 1, 1))
-    tables = []
-    for each in (NUMPY, kernels):
-        own, covariance = x.copy(), A @ A.transpose(0, 2, 1) + 0.1 * np.eye(4)
-        kalman = filter_of(each)
-        kalman.predict(own, covariance, dt_s)
-        kalman.update(own, covariance, rows, z, R)
-        tables += [own, covariance]
-    for one, other in zip(tables[:2], tables[2:], strict=True):
-        np.testing.assert_array_equal(one, other)
 
 
 @given(seed=SEEDS, n=st.integers(0, 6), dt_s=st.sampled_from([0.0, 0.1, 3.0]))

@@ -1,8 +1,7 @@
-/* The filters of tracks (tracking/kalman.py, tracking/motion_filter.py), and what proposals show of their tracks
- * (tracking/extent.py).
+/* The filter of tracks (tracking/motion_filter.py), and what proposals show of their tracks (tracking/extent.py).
  *
- * A state is x, y [m], heading [rad], speed [m/s]; M states are rows of four numbers, and their covariances rows of
- * 4 x 4. Cosines, sines and headings come from NumPy, so that both implementations share their rounding.
+ * A published state is x, y [m], heading [rad], speed [m/s]. States are rows of four numbers, and their covariances rows
+ * of 4 x 4. Headings come from NumPy, so that both implementations share their rounding.
  */
 #include "kernels.h"
 
@@ -10,122 +9,6 @@ enum { X, Y, HEADING, SPEED, N_STATE };
 enum { N_AXES = 4, N_ENDS = 2 * N_AXES }; /* of a k-DOP; the end opposite to end k is k + N_AXES */
 
 static const double PI = 0x1.921fb54442d18p+1;
-
-/* An angle in [-pi, pi), as geometry.wrap: the remainder is found by subtractions, none of which rounds. */
-static double wrap(double angle)
-{
-    const double full_turn = 2 * PI, from = angle + PI;
-    double rest = __builtin_fabs(from);
-    double step = full_turn;
-    while (step <= rest / 2 && step < 1e300)
-        step *= 2;
-    for (; step >= full_turn; step /= 2)
-        if (rest >= step)
-            rest -= step;
-    return (from < 0.0 && rest > 0.0 ? full_turn - rest : rest) - PI;
-}
-
-/* The covariance P after an observed position: P less the gain times the rows observed, and the mean of that and its
- * transpose, which rounding made differ. */
-static void reduce_covariance(double P[N_STATE][N_STATE], const double gain[N_STATE][2])
-{
-    double reduced[N_STATE][N_STATE];
-    for (int i = 0; i < N_STATE; i++)
-        for (int k = 0; k < N_STATE; k++)
-            reduced[i][k] = P[i][k] - (gain[i][0] * P[X][k] + gain[i][1] * P[Y][k]);
-    for (int i = 0; i < N_STATE; i++)
-        for (int k = 0; k < N_STATE; k++)
-            P[i][k] = (reduced[i][k] + reduced[k][i]) / 2;
-}
-
-/* kalman.predict: all n states dt_s later, in place (Equation 1). F is the derivative of x and y by heading and speed,
- * which themselves stay as they are, so that F P F' needs products with the two last rows and columns of P alone. */
-EXPORT void modt_predict(double (*states)[N_STATE], double (*covariances)[N_STATE][N_STATE], i64 n,
-                         const double *cosine, const double *sine, double dt_s, double speed_noise,
-                         double position_noise, double heading_noise)
-{
-    for (i64 m = 0; m < n; m++) {
-        double *x = states[m];
-        double(*P)[N_STATE] = covariances[m];
-        const double along_x = dt_s * cosine[m], along_y = dt_s * sine[m], speed = x[SPEED];
-        const double F[2][2] = {{-along_y * speed, along_x}, {along_x * speed, along_y}};
-        double cross[2][2]; /* covariance of x and y with heading and speed */
-        for (int i = 0; i < 2; i++) {
-            x[i] += F[i][1] * speed;
-            for (int k = 0; k < 2; k++)
-                cross[i][k] = P[i][2 + k] + (F[i][0] * P[HEADING][2 + k] + F[i][1] * P[SPEED][2 + k]);
-        }
-        for (int i = 0; i < 2; i++)
-            for (int k = 0; k < 2; k++)
-                P[i][k] += (F[i][0] * P[HEADING][k] + F[i][1] * P[SPEED][k])
-                           + (cross[i][0] * F[k][0] + cross[i][1] * F[k][1]);
-        for (int i = 0; i < 2; i++) {
-            P[i][i] += position_noise;
-            P[i][HEADING] = P[HEADING][i] = cross[i][0];
-            P[i][SPEED] = P[SPEED][i] = cross[i][1] + speed_noise / 2 * F[i][1];
-        }
-        P[HEADING][HEADING] += heading_noise;
-        P[SPEED][SPEED] += speed_noise;
-    }
-}
-
-/* kalman.face: rotates the covariance of the position, and its rows and columns with the rest, by a turn. */
-static void rotate_position(double P[N_STATE][N_STATE], double cosine, double sine)
-{
-    const double rotation[2][2] = {{cosine, -sine}, {sine, cosine}};
-    double rows_rotated[N_STATE][N_STATE];
-    for (int k = 0; k < N_STATE; k++)
-        for (int i = 0; i < N_STATE; i++)
-            rows_rotated[i][k] = i < 2 ? rotation[i][0] * P[X][k] + rotation[i][1] * P[Y][k] : P[i][k];
-    for (int i = 0; i < N_STATE; i++)
-        for (int k = 0; k < N_STATE; k++)
-            P[i][k] = k < 2 ? rows_rotated[i][X] * rotation[k][0] + rows_rotated[i][Y] * rotation[k][1]
-                            : rows_rotated[i][k];
-}
-
-/* kalman.turn_about: the same motion with a speed that is not negative. */
-static void turn_about(double x[N_STATE], double P[N_STATE][N_STATE])
-{
-    if (!(x[SPEED] < 0.0))
-        return;
-    x[SPEED] = -x[SPEED];
-    x[HEADING] = wrap(x[HEADING] + PI);
-    for (int k = 0; k < N_STATE; k++)
-        if (k != SPEED) {
-            P[SPEED][k] = -P[SPEED][k];
-            P[k][SPEED] = -P[k][SPEED];
-        }
-}
-
-/* kalman.Filter.update: the states and covariances of n rows of the table after observed positions, in place. Each is
- * turned to a heading first, given with the cosine and sine of that turn; then follow the update of the filter and the
- * turn to a speed that is not negative. */
-EXPORT void modt_update(double (*states)[N_STATE], double (*covariances)[N_STATE][N_STATE], const i64 *rows, i64 n,
-                        const double *heading, const double *cosine, const double *sine, const double (*position)[2],
-                        const double (*noise)[2][2])
-{
-    for (i64 m = 0; m < n; m++) {
-        double *x = states[rows[m]];
-        double(*P)[N_STATE] = covariances[rows[m]];
-        rotate_position(P, cosine[m], sine[m]);
-        x[HEADING] = wrap(heading[m]);
-        /* S, the covariance of the innovation, and its inverse */
-        double xx = P[X][X] + noise[m][0][0], xy = P[X][Y] + noise[m][0][1];
-        double yx = P[Y][X] + noise[m][1][0], yy = P[Y][Y] + noise[m][1][1];
-        double determinant = xx * yy - xy * yx;
-        const double inverse[2][2] = {{yy / determinant, -xy / determinant}, {-yx / determinant, xx / determinant}};
-        double innovation_x = position[m][0] - x[X], innovation_y = position[m][1] - x[Y];
-        double gain[N_STATE][2];
-        for (int i = 0; i < N_STATE; i++) {
-            for (int k = 0; k < 2; k++)
-                gain[i][k] = P[i][X] * inverse[0][k] + P[i][Y] * inverse[1][k];
-            x[i] += gain[i][0] * innovation_x + gain[i][1] * innovation_y;
-        }
-        x[HEADING] = wrap(x[HEADING]);
-        reduce_covariance(P, gain);
-        turn_about(x, P);
-    }
-}
 
 /* motion_filter: states of what moves are x, y [m] and their velocities [m/s], those of what rests x and y. */
 enum { VX = 2 };

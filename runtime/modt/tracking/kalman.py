@@ -8,14 +8,11 @@ all tracks, and arithmetic runs along it. Along axes of four it would be slow.
 
 from __future__ import annotations
 
-import ctypes
 from typing import NamedTuple
 
 import numpy as np
 
 from modt.geometry import wrap
-from modt.geometry.kernels import GeometryKernels
-from modt.native.declarations import declare
 from modt.tracking.tuning import FilterTuning
 from modt.types import Float64, Int
 
@@ -184,32 +181,3 @@ def _heading(x: Float64, speed_variance: Float64, z: Float64) -> Float64:
     step_x, step_y = z - x[:2]
     heading: Float64 = np.where(np.abs(x[SPEED]) < np.sqrt(speed_variance), np.arctan2(step_y, step_x), x[HEADING])
     return heading
-
-
-class NativeFilter(Filter):
-    """`Filter` in C (`modt.native`)."""
-
-    def __init__(self, library: ctypes.CDLL, tuning: FilterTuning) -> None:
-        super().__init__(tuning)
-        declare(library, "filter.c")
-        self._library = library
-
-    def predict(self, x: Float64, P: Float64, dt_s: float) -> None:
-        """All states dt_s later."""
-        heading = x[:, HEADING].copy()
-        noise = ProcessNoise.over(dt_s, self.tuning.acceleration_sigma_mps2, self.tuning.turn_sigma_radps)
-        self._library.modt_predict(
-            x, P, len(x), np.cos(heading), np.sin(heading), dt_s, noise.speed, noise.position, noise.heading
-        )
-
-    def update(self, x: Float64, P: Float64, rows: Int, z: Float64, R: Float64) -> None:
-        """The rows after the observed places z (K, 2) of covariance R (K, 2, 2), at a speed that is not negative."""
-        state = x.take(rows, axis=0).T.copy()
-        heading = _heading(state, P[rows, SPEED, SPEED], z.T.copy())
-        turn = heading - state[HEADING]
-        self._library.modt_update(x, P, rows, len(rows), heading, np.cos(turn), np.sin(turn), z, R)
-
-
-def filter_of(kernels: GeometryKernels, tuning: FilterTuning = FilterTuning()) -> Filter:
-    """The filter: native if the kernels have a library, else in NumPy."""
-    return Filter(tuning) if kernels.library is None else NativeFilter(kernels.library, tuning)

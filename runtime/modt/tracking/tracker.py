@@ -14,7 +14,7 @@ from modt.observations import Located, Observations, StaticTracks
 from modt.tracking.association import Associated, Association, Matches
 from modt.tracking.extent import extent_update_of
 from modt.tracking.hiding import Hiding
-from modt.tracking.kalman import SPEED, filter_of, velocity_of
+from modt.tracking.kalman import SPEED, Filter, velocity_of
 from modt.tracking.kdop_association import KdopAssociation
 from modt.tracking.motion_filter import motion_filter_of
 from modt.tracking.paper_association import PaperAssociation
@@ -68,7 +68,7 @@ class Tracker:
         self._period_s = period_s
         self._regrouping = Regrouping(kernels, tuning)
         self._update_extent = extent_update_of(kernels, tuning.extent)
-        self._filter = filter_of(kernels, tuning.filter)
+        self._filter = Filter(tuning.filter)
         position_m = tuning.filter.initial_position_sigma_m
         unknown_heading_rad = np.pi
         sigma = [position_m, position_m, unknown_heading_rad, tuning.filter.initial_speed_sigma_mps]
