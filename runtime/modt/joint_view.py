@@ -18,7 +18,7 @@ from modt.errors import MisuseError
 from modt.geometry import inverse, se3, transform, transform_boxes, wrap
 from modt.pipeline import SegmentationStage
 from modt.placement import Placement, PlanarMotion, delays, joined_points, moved_points
-from modt.segmentation.joining import SensorProposals, join
+from modt.segmentation.joining import SensorProposals, join, square_range_m2
 from modt.segmentation.kernels import Kernels
 from modt.segmentation.tuning import JoiningTuning
 from modt.sensor_fit.levelling import Leveller
@@ -38,8 +38,8 @@ class SensorPart:
 class JointView:
     """What several sensors see together.
 
-    The sweeps of a frame are of different times, and what is seen within one is as well. The proposals of each are
-    moved to the stamp of the frame by the motion of the robot in the frame before.
+    The sweeps of a frame differ in their stamps, and a sweep takes time itself. So the proposals of each are moved to
+    the stamp of the frame, by the motion of the robot in the frame before.
 
     Args:
         parts: the sensors, in the order of the sweeps of a frame.
@@ -74,6 +74,7 @@ class JointView:
             names = ", ".join(part.mounted.name for part in self._parts)
             raise MisuseError("frame", f"holds no sweeps of {names}", "open its recording by this profile")
         sweeps = [self._level_sweep(k, frame) for k in range(len(self._parts))]
+        # A level pose of any sensor gives the pose of the common frame.
         T_world_common = None
         for T_common_level, sweep in zip(self._T_common_level, sweeps, strict=True):
             if sweep is not None and sweep.T_world_sensor is not None:
@@ -107,8 +108,9 @@ class JointView:
                 proposals = replace(proposals, reflectance=None)
             step = self._motion.displacement(proposals.centroid[:, :2], delay_s + (sweep.stamp_s - frame.stamp_s))
             proposals = _shifted(proposals, step)
-            range2_m2 = _range2_m2(seen) / _range2_m2(proposals)
-            yield SensorProposals(proposals, solid_angles(seen.box, part.sensor) * range2_m2, len(sweep.points))
+            # A point covers the same area, whether it is seen from the sensor or from the common origin.
+            nearer = square_range_m2(seen.box) / square_range_m2(proposals.box)
+            yield SensorProposals(proposals, solid_angles(seen.box, part.sensor) * nearer, len(sweep.points))
 
     def finish(self, result: FrameResult, placement: Placement) -> FrameResult:
         """The result in the frame of the robot. The motion of the robot is kept for the next frame."""
@@ -136,12 +138,6 @@ class JointView:
             moved.append(moved_points(T, frame.points[begin:end]))
             begin = end
         return np.concatenate(moved)
-
-
-def _range2_m2(proposals: Proposals) -> Float64:
-    """(P,) squares of the horizontal distances of the boxes, 1 at least [m2]."""
-    x, y = proposals.box[:, :2].T
-    return np.asarray(np.maximum(x * x + y * y, 1.0))
 
 
 def _moved(proposals: Proposals, T: Float64) -> Proposals:

@@ -62,7 +62,6 @@ def _side_by_side(views: Sequence[SensorProposals]) -> Proposals:
     reflectance = None
     if any(part.reflectance is not None for part in parts):
         reflectance = np.concatenate([_reflectance(part) for part in parts])
-    # Both rows of the feet are points.
     feet = [part.feet + first for part, first in zip(parts, first_point, strict=False) if part.feet is not None]
     return Proposals(
         members=np.concatenate([part.members + first for part, first in zip(parts, first_point, strict=False)]),
@@ -113,17 +112,21 @@ def _cells(proposals: Proposals, which: Int, cell_m: float) -> _Cells:
 
 
 def _partners(proposals: Proposals, sensor: Int, tuning: JoiningTuning) -> Int:
-    """(2, k) pairs of proposals of two sensors, each of them the one with which either shares most cells."""
+    """(2, k) pairs of proposals that are joined.
+
+    Two proposals of two sensors are joined where they share cells, are near one another in height, and at least one
+    of them shares most of its cells with the other.
+    """
     n = len(proposals)
     cells = [_cells(proposals, np.flatnonzero(sensor == k), tuning.cell_m) for k in range(sensor.max(initial=-1) + 1)]
-    pairs = [_shared(a, b, n) for a, b in combinations(cells, 2)]
-    pair = np.concatenate([*pairs, np.zeros((3, 0), np.int64)], axis=1)
-    a, b, _ = pair
+    shared_of_sensors = [_shared(a, b, n) for a, b in combinations(cells, 2)]
+    candidates = np.concatenate([*shared_of_sensors, np.zeros((3, 0), np.int64)], axis=1)
+    a, b, _ = candidates
     bottom = proposals.box[:, 2] - proposals.box[:, 5] / 2
     top = bottom + proposals.box[:, 5]
     near = np.maximum(bottom[a], bottom[b]) - np.minimum(top[a], top[b]) < tuning.gap_m
-    a, b, shared = pair[:, near]
-    most = np.zeros(n, np.int64)
+    a, b, shared = candidates[:, near]
+    most = np.zeros(n, np.int64)  # cells that each proposal shares with its best partner
     np.maximum.at(most, a, shared)
     np.maximum.at(most, b, shared)
     best = (shared == most[a]) | (shared == most[b])
@@ -131,7 +134,7 @@ def _partners(proposals: Proposals, sensor: Int, tuning: JoiningTuning) -> Int:
 
 
 def _shared(a: _Cells, b: _Cells, n: int) -> Int:
-    """(3, k) proposals of two sensors that share cells, or have neighbouring ones, and the number of such pairs."""
+    """(3, k) proposals of one and of another sensor, and the number of pairs of their cells that are one or touch."""
     hits = []
     for i, k in _NEIGHBOURS:
         wanted = a.number + (i * _STRIDE + k)
@@ -143,8 +146,11 @@ def _shared(a: _Cells, b: _Cells, n: int) -> Int:
 
 
 def _groups(n: int, pairs: Int) -> Int:
-    """(n,) group of each proposal, in the order of their first ones; pairs (2, k) are of one group."""
-    first = np.arange(n)  # of the proposals known to be of the same group
+    """(n,) group of each proposal; the two of each pair (2, k) are in one. Groups are in the order of their first ones.
+
+    Each proposal starts as a group of its own. The lower number of a pair is passed on until nothing changes.
+    """
+    first = np.arange(n)  # first proposal of the group of each, as far as it is known
     before = np.zeros(0, np.int64)
     while not np.array_equal(first, before):
         before = first.copy()
@@ -182,17 +188,17 @@ def _joined(proposals: Proposals, sensor: Int, group: Int, kernels: Kernels) -> 
         centroid=centroid,
         cut=np.bitwise_and.reduceat(proposals.cut[order], first),  # where one of them sees the end, it is seen
         ground_z_m=np.add.reduceat((_ground_z_m(proposals) * count)[order], first) / total,
-        beam_sr=covered_m2 / (sensors * total * _square_range_m2(box)),
+        beam_sr=covered_m2 / (sensors * total * square_range_m2(box)),
     )
 
 
 def _point_m2(proposals: Proposals) -> Float64:
     """(P,) area that a point of each covers."""
     assert proposals.beam_sr is not None  # what stands side by side has it
-    return proposals.beam_sr * _square_range_m2(proposals.box)
+    return proposals.beam_sr * square_range_m2(proposals.box)
 
 
-def _square_range_m2(box: Float64) -> Float64:
+def square_range_m2(box: Float64) -> Float64:
     """(P,) squares of the horizontal distances of boxes (P, 7), 1 at least [m2]."""
     x, y = box[:, :2].T
     return np.asarray(np.maximum(x * x + y * y, 1.0))

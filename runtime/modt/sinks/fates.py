@@ -53,14 +53,14 @@ class Fates:
             self._count[after] += n
 
     def end(self) -> None:
-        """Count what waits still as held."""
+        """Move the lines that wait to those held. From now on no line waits."""
         with self._changing:
             self._count[HELD] += self._count[WAITING]
             self._count[WAITING] = 0
             self._ended = True
 
     def counts(self) -> dict[str, int]:
-        """Number of lines of each fate, without the fates that none has but `written` and `waiting`."""
+        """Number of lines of each fate that a line has; `written` and `waiting` are always among them."""
         with self._changing:
             return {fate: n for fate, n in self._count.items() if n or fate in (WRITTEN, WAITING)}
 

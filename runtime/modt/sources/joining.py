@@ -40,7 +40,10 @@ class SweepJoiner:
         self._held: Sweeps = {}
 
     def add(self, sensor: int, sweep: Frame) -> Iterator[Sweeps]:
-        """Yield what is complete with a sweep, whose stamp is on the common clock."""
+        """Hold a sweep, whose stamp is on the common clock, and yield the sweeps of each frame that is complete now.
+
+        A sweep that is too far in time from those that wait, or a second one of its sensor, ends their frame.
+        """
         self.absent.discard(sensor)
         if self._held and (sensor in self._held or self._is_far(sweep.stamp_s)):
             yield self.take()
@@ -54,7 +57,7 @@ class SweepJoiner:
         return bool(self._held)
 
     def take(self) -> Sweeps:
-        """The sweeps that wait for others; they wait no longer. Empty if there are none."""
+        """End the frame of the sweeps that wait for others, and return them; empty if there are none."""
         held = self._held
         self._held = {}
         return held
@@ -76,7 +79,7 @@ def joint_frame(index: int, sweeps: Sweeps, sensors: Sequence[MountedSensor]) ->
 
 
 def joined_reading(parts: Sequence[Reading], alone: Counter[str]) -> Reading:
-    """What was read of all sensors: numbers are added, texts of the first that has one."""
+    """What was read of all sensors. Numbers and lists are added; a text is that of the first sensor that has one."""
     total = Reading()
     for part in parts:
         for name in (field.name for field in fields(Reading)):

@@ -36,7 +36,7 @@ SUMS = ("messages", "lost_messages", "sweeps", "incomplete_sweeps", "dropped_swe
 
 
 class JointLive:
-    """Hands over frames with the sweeps of several sensors; arguments and interface as of LiveStream.
+    """Hands over frames with the sweeps of several sensors; the interface is that of LiveStream.
 
     A sensor that is silent is waited for once. The others go on meanwhile.
 
@@ -120,7 +120,7 @@ class JointLive:
         """Wait at most `timeout_s` for the next frame; None without one.
 
         Raises:
-            Exception: the error that ended the last of the sensors.
+            Exception: all sensors have ended; the error that ended the first of them.
         """
         until_s = self._clock() + timeout_s
         while True:
@@ -139,7 +139,7 @@ class JointLive:
                 self._wait(due_s - now_s)
 
     def _collect(self) -> None:
-        """Take what the sensors have, and what has waited long enough."""
+        """Take what the sensors have received, and end a frame that has waited long enough for its other sweeps."""
         for sensor, stream in enumerate(self._streams):
             if sensor in self._ended:
                 continue
@@ -184,7 +184,7 @@ class JointLive:
     def _on_common_clock(self, sensor: int, received: Received) -> Frame:
         """The sweep with stamp and steady time on the clocks of the frames."""
         sweep = received.frame
-        self._clocks[sensor].unwrapped(sweep.stamp_s, received.arrived_s)
+        self._clocks[sensor].unwrapped(sweep.stamp_s, received.arrived_s)  # measures the offset of its clock
         if self._reference is None or self._began_s is None:
             self._reference = sensor
             self._began_s = received.arrived_s
@@ -195,8 +195,9 @@ class JointLive:
             names = self._sensors[sensor].name, self._sensors[self._reference].name
             remedy = "sweeps are joined by their arrival, which is less exact; synchronise both by PTP or NTP"
             log.warning("the clocks of the sensors %s and %s differ by %.3f s: %s", *names, abs(ahead_s), remedy)
-        begins_s = received.arrived_s - self._began_s - sweep.time_s
-        steady_s = sweep.time_s + self._steady_shift_s.setdefault(sensor, begins_s)
+        # The steady time of each stream begins at its own first sweep, that of the frames at the first one of all.
+        first_shift_s = received.arrived_s - self._began_s - sweep.time_s
+        steady_s = sweep.time_s + self._steady_shift_s.setdefault(sensor, first_shift_s)
         return replace(sweep, stamp_s=sweep.stamp_s + shift_s, steady_s=steady_s)
 
     def _wait_for_arrival(self, timeout_s: float) -> None:
