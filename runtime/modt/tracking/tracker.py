@@ -275,7 +275,9 @@ class Tracker:
     def _keep_tops(self, frame: Associated, box_before: Float64) -> Proposals:
         """Keep the former tops of people whose top the view cuts off, in the tracks and in the returned proposals.
 
-        Write which tracks are people whose upper half is cut off (`top_cut`).
+        Within two metres of a low sensor its view ends at the hips. Without this the box of a person who comes near
+        shrinks to the legs. Write which tracks are people whose upper half is cut off (`top_cut`): legs alone are
+        not classified, are no evidence of a size, and may be joined.
 
         Args:
             frame: frame after regrouping.
