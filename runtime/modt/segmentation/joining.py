@@ -146,7 +146,7 @@ def _shared(a: _Cells, b: _Cells, n: int) -> Int:
 
 
 def _groups(n: int, pairs: Int) -> Int:
-    """(n,) group of each proposal; the two of each pair (2, k) are in one. Groups are in the order of their first ones.
+    """(n,) group of each proposal; both of each pair (2, k) are in one. Groups have the order of their first ones.
 
     Each proposal starts as a group of its own. The lower number of a pair is passed on until nothing changes.
     """
