@@ -260,12 +260,14 @@ def test_a_reload_of_compare_profiless_profile_is_a_reason_until_the_right_one_i
 
 def test_a_reduced_frame_holds_what_is_near():
     stages = stages_of()
-    frame = frames()[0]
+    delay_s = np.arange(len(frames()[0].points), dtype=np.float32)
+    frame = dataclasses.replace(frames()[0], delay_s=delay_s)
     reach_m = REACH_SHARE * stages.config.sensor.max_range_m
     result = stages.step(frame, UNLIMITED, reduced=True)
-    distance_m = np.hypot(*result.frame.points[:, :2].T)
-    assert distance_m.max() <= reach_m
-    assert len(result.frame.points) == np.count_nonzero(np.hypot(*frame.points[:, :2].T) <= reach_m)
+    is_near = np.hypot(*frame.points[:, :2].T) <= reach_m
+    assert not is_near.all()
+    assert result.frame.points.tolist() == frame.points[is_near].tolist()
+    assert result.frame.delay_s.tolist() == delay_s[is_near].tolist()
 
 
 def followed(stages, sweeps):

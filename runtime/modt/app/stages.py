@@ -321,7 +321,8 @@ def _within(frame: Frame, range_m: float) -> Frame:
     x, y = frame.points[:, :2].T
     near = np.square(x) + np.square(y) <= range_m**2
     sweeps = tuple(sweep and _within(sweep, range_m) for sweep in frame.sweeps)
-    return replace(frame, points=frame.points[near], sweeps=sweeps)
+    delay_s = None if frame.delay_s is None else frame.delay_s[near]
+    return replace(frame, points=frame.points[near], delay_s=delay_s, sweeps=sweeps)
 
 
 def _watch(config: ProfileConfig, before: TrustWatch | JointWatch | None = None) -> TrustWatch | JointWatch:
