@@ -23,7 +23,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import chain, pairwise, repeat
+from itertools import chain, pairwise, repeat, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -178,11 +178,13 @@ class Sender:
             packets.connect(("127.0.0.1", self._ports[0]))
             poses.connect(("127.0.0.1", self._ports[1]))
             self.began_s = self._wait(packets, poses, waiting)
-            end = repeat((np.inf, bytes(PACKET_BYTES)))
-            for at_s, payload in self._faulty.applied(chain(self._drive(drive, given, poses), end)):
-                if np.isinf(at_s):
-                    break
+            for at_s, payload in self._let_through(self._drive(drive, given, poses)):
                 self._send_packet(packets, payload, at_s)
+
+    def _let_through(self, drive: Iterator[Timed]) -> Iterator[Timed]:
+        """The packets of the drive as the faults leave them."""
+        end = repeat((np.inf, bytes(PACKET_BYTES)))  # faults of an exhausted drive would be applied for ever
+        return takewhile(lambda timed: timed[0] < np.inf, self._faulty.applied(chain(drive, end)))
 
     def _drive(self, drive: Sequence[bytes], given: Sequence[Frame], poses: socket.socket) -> Iterator[Timed]:
         """Each packet of the drive at its time, after the poses and the faults that are due.
