@@ -44,7 +44,8 @@ def find_people(x: Float32, y: Float32, low: Float32, high: Float32, entries: In
     square_m2 = np.stack([_square_m2(at, peak) for peak in peaks])  # (peaks, m)
     near = square_m2 < tuning.reach_m * tuning.reach_m
     nearest = square_m2.argmin(axis=0)
-    lower = _is_lower(at, high, square_m2.min(axis=0), tuning)
+    nearest_m2 = square_m2.min(axis=0)
+    lower = _is_lower(at, high, nearest_m2, tuning)
     reach_m2 = np.zeros(len(peaks))  # cells of a peak that is nothing stay
     for k, peak in enumerate(peaks):
         own = (nearest == k) & lower
@@ -52,15 +53,13 @@ def find_people(x: Float32, y: Float32, low: Float32, high: Float32, entries: In
             reach_m2[k] = _reach_m2(at, low, high, entries, own, near[k], peak, tuning)
     heads = reach_m2.nonzero()[0]
     # Peaks come from the highest on, so something higher than a person is the first of them.
-    is_divided = len(heads) > 1
-    if len(heads) == 1:
-        is_divided = not lower[peaks[0]] or _pushes(at, high, entries, peaks[heads[0]], tuning)
-    if not is_divided:
-        return person
-    person_of_peak = np.full(len(peaks), NONE)
-    person_of_peak[heads] = np.arange(len(heads))
-    around = (square_m2.min(axis=0) < reach_m2[nearest]) & lower
-    person[around] = person_of_peak[nearest[around]]
+    beside_higher = not lower[peaks[0]]
+    one_divides = len(heads) == 1 and (beside_higher or _pushes(at, high, entries, peaks[heads[0]], tuning))
+    if len(heads) > 1 or one_divides:
+        person_of_peak = np.full(len(peaks), NONE)
+        person_of_peak[heads] = np.arange(len(heads))
+        around = (nearest_m2 < reach_m2[nearest]) & lower
+        person[around] = person_of_peak[nearest[around]]
     return person
 
 
