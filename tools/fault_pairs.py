@@ -115,18 +115,37 @@ CHANGES = (
 
 @dataclass(frozen=True, slots=True)
 class Episode:
-    """A fault from one frame up to another one."""
+    """A fault from one frame up to another one.
+
+    Attributes:
+        turned: share of a turn after which it begins and ends within these frames. Sweeps begin behind, and a fault
+            waits for none.
+    """
 
     change: Change
     begin: int
     end: int
+    turned: float
+
+    def changes(self, k: int, frame: Frame, before: Frame) -> Frame:
+        """Frame k with this fault; `before` is the frame before the fault."""
+        if not self.begin <= k <= self.end:
+            return frame
+        whole = moved_by(self.change, frame, before)
+        if self.begin < k < self.end:
+            return whole
+        late = (np.pi - _bearing(frame.points)) / (2 * np.pi) > self.turned
+        faulty = late if k == self.begin else ~late
+        parts = frame.points[~faulty], self.change.points(frame.points[faulty])
+        return replace(whole if k == self.begin else frame, points=np.concatenate(parts))
 
 
 def drawn(rng: np.random.Generator) -> tuple[Episode, Episode]:
     """Two faults; the second one begins while the first one lasts, and ends after it."""
     one, other = rng.choice(len(CHANGES), 2, replace=False)
     first, second = overlapping(rng)
-    return Episode(CHANGES[one], *first), Episode(CHANGES[other], *second)
+    turned = rng.random(2)
+    return Episode(CHANGES[one], *first, turned[0]), Episode(CHANGES[other], *second, turned[1])
 
 
 def overlapping(rng: np.random.Generator) -> tuple[tuple[int, int], tuple[int, int]]:
@@ -145,10 +164,10 @@ def levels_of(stream: SyntheticStream, frames: list[Frame], pair: tuple[Episode,
     points = frames[0].points
     for k, frame in enumerate(frames):
         given = frame
-        active = [episode for episode in pair if episode.begin <= k < episode.end]
-        for episode in active:
-            given = moved_by(episode.change, given, frames[episode.begin - 1])
-        if any(episode.change.freezes for episode in active):  # a frozen sensor repeats what it sent before
+        for episode in pair:
+            given = episode.changes(k, given, frames[episode.begin - 1])
+        # A frozen sensor repeats what it sent before.
+        if any(e.change.freezes and e.begin <= k < e.end for e in pair):
             given = replace(given, points=points)
         points = given.points
         levels.append(stages.step(given, stages.budget, reduced=False).trust.level)

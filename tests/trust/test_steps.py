@@ -32,7 +32,8 @@ class Ground:
     def look(self, height_m):
         """The phrase after a look at the floor, which it reaches from one sweep to the next."""
         now = self.floor(self.before.time_s + 0.6, height_m)
-        self.check.look(self.before, now, [(self.before, now)], BACK_LOOKS)
+        moved = self.check.has_moved(self.before, now)
+        self.check.look(now, [(self.before, now, now)] if moved else [], BACK_LOOKS)
         if not self.check.phrase:
             self.check.learn(now)
         self.before = now

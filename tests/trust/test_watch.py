@@ -103,6 +103,30 @@ def test_a_fault_is_reported_within_two_seconds_and_withdrawn_within_three(name)
     assert levels[-1] == TrustLevel.GOOD
 
 
+@pytest.mark.parametrize("posed", [True, False], ids=["posed", "registered"])
+@pytest.mark.parametrize("share", [0.3, 0.5, 0.7])
+@pytest.mark.parametrize("name", sorted(FAULTS.keys() - {"frozen"}))
+def test_a_fault_that_begins_and_ends_within_a_sweep_is_reported_and_withdrawn_like_others(name, share, posed):
+    """No sensor is knocked or covered just at its seam. Poses by registration do not contradict a turned sensor."""
+    watch = TrustWatch(load(SENSOR).sensor)
+    levels = []
+    for k, frame in enumerate(drive("street")):
+        sweep = faulty_from(FAULTS[name], share, k, frame.points)
+        given = replace(frame, points=sweep, T_world_sensor=frame.T_world_sensor if posed else None)
+        levels.append(watch.add(given, frame.T_world_sensor).level)
+    levels = np.array(levels)
+    assert (levels[:ONSET] == TrustLevel.GOOD).all()
+    assert (levels[ONSET + 20 : END] > TrustLevel.GOOD).all()
+    assert levels[-1] == TrustLevel.GOOD
+
+
+def faulty_from(fault, share, k, points):
+    """Points of sweep k of a fault that begins and ends after a share of a turn; clockwise, from behind."""
+    turned = (np.pi - bearing(points)) / (2 * np.pi)
+    faulty = (k + turned > ONSET + share) & (k + turned < END + share)
+    return np.concatenate([points[~faulty], fault(points[faulty], k)])
+
+
 @pytest.mark.parametrize("name", ["rolled by 15 deg", "pitched by -8 deg", "a fifth farther"])
 @pytest.mark.parametrize("scene", ["hills", "loading"])
 def test_a_ground_that_moves_among_hills_and_ramps_is_reported_and_withdrawn(scene, name):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from modt.trust.sample import RINGS, SECTORS, Sample
+from modt.trust.sample import RINGS, SECTORS, Sample, Three
 from modt.trust.tuning import GroundTuning
 from modt.types import Float32, Float64, Int
 
@@ -84,23 +84,22 @@ class GroundCheck:
     def _known(self) -> bool:
         return self._known_looks >= KNOWN_LOOKS
 
-    def look(self, first: Sample, now: Sample, pairs: Sequence[tuple[Sample, Sample]], back_looks: int) -> None:
+    def look(self, now: Sample, threes: Sequence[Three], back_looks: int) -> None:
         """Notice a ground that moves at once, and one that is back.
 
         It is back where it stands as before the step or fits the known plane in enough looks, and at once if a step
         the other way has undone most of it.
 
         Args:
-            first: the sweep of the look before.
             now: the sweep that is looked at.
-            pairs: sweeps since `first`, each with the one that came soon after it.
+            threes: sweeps since the last look, each with the two that came soon after it; none if the ground has not
+                moved since then.
             back_looks: number of looks in a row in which it has to be back.
         """
         self.undone = False
         if not self._known:
             return
-        if self._size(_moved_between(first, now)) >= self._least():
-            self._add(pairs)
+        self._add_steps(threes)
         if self._before is None:
             return
         as_before = self._size(_moved_between(self._before, now)) < BACK_SHARE
@@ -112,13 +111,17 @@ class GroundCheck:
             self.phrase = ""
             self._before = None
 
+    def has_moved(self, before: Sample, now: Sample) -> bool:
+        """Whether the ground stands elsewhere than in a sweep before, at once or not."""
+        return self._known and self._size(_moved_between(before, now)) >= self._least()
+
     def look_past(self, before: Sample, now: Sample, *, same_place: bool) -> None:
         """Notice a ground that moved since a sweep after which nothing was seen, though slopes may have passed."""
         if not self._known or self._before is not None:
             return
         steps = (_moved_between(before, now), self._from_plane(now))
         if min(self._size(step) for step in steps) >= (1.0 if same_place else UNSEEN_FACTOR):
-            self._add([(before, now)])
+            self._add(_moved_between(before, now), before, now)
 
     def forget_step_within(self, begin_s: float, end_s: float) -> None:
         """Forget a step that began in some time. A turned scene on a slope moves the ground as well."""
@@ -133,24 +136,32 @@ class GroundCheck:
             return OUT_OF_VIEW
         return _fitted(cells, sample.lowest_m.take(cells) - self.plane @ _CELLS.take(cells, axis=1))
 
-    def _add(self, pairs: Sequence[tuple[Sample, Sample]]) -> None:
-        """Add the steps of the ground between the two sweeps of each pair."""
-        for before, after in pairs:
-            step = _moved_between(before, after)
-            if self._size(step) < self._least():
-                continue
-            if self._before is None and self._undoes_withdrawn(step, after.time_s):
-                self.undone = True
-                self.plane = self.plane + step  # it was learned while the sensor was moved
-                continue
-            if self._before is None:
-                self._before = before
-                self._offset = np.zeros(3)
-                self._greatest = 0.0
-                self._looks = 0
-            self._offset = self._offset + step
-            self._greatest = max(self._greatest, self._size(self._offset))
-            self.phrase = self._describe()
+    def _add_steps(self, threes: Sequence[Three]) -> None:
+        """Add the steps of the ground within three sweeps each, the greatest first.
+
+        A step shows in two or three groups of sweeps that follow one another, and is added once.
+        """
+        steps = [_moved_at_once(*three) for three in threes]
+        sizes = np.array([self._size(step) for step in steps])
+        while len(sizes) and sizes.max() >= self._least():
+            k = int(sizes.argmax())
+            self._add(steps[k], threes[k][0], threes[k][2])
+            sizes[max(k - 2, 0) : k + 3] = 0.0
+
+    def _add(self, step: Float64, before: Sample, after: Sample) -> None:
+        """Add a step (3,) of the ground between two sweeps."""
+        if self._before is None and self._undoes_withdrawn(step, after.time_s):
+            self.undone = True
+            self.plane = self.plane + step  # it was learned while the sensor was moved
+            return
+        if self._before is None:
+            self._before = before
+            self._offset = np.zeros(3)
+            self._greatest = 0.0
+            self._looks = 0
+        self._offset = self._offset + step
+        self._greatest = max(self._greatest, self._size(self._offset))
+        self.phrase = self._describe()
 
     def _is_undone(self, left: Float64, greatest: float) -> bool:
         """Whether hardly anything is left of a step of some greatest size."""
@@ -202,6 +213,20 @@ def _moved_between(before: Sample, after: Sample) -> Float64:
         return _fitted(both, after.lowest_m.take(both) - before.lowest_m.take(both))
     expected = ground.reshape(SECTORS, RINGS)[after.seen]
     return OUT_OF_VIEW if np.count_nonzero(expected) > 2 * MIN_CELLS else np.zeros(3)
+
+
+def _moved_at_once(before: Sample, between: Sample, after: Sample) -> Float64:
+    """Plane (3,) by which most of the cells moved from one of three sweeps to the next.
+
+    What happens to a sensor does not wait for its seam. Some directions of the sweep in which it begins show it
+    already, so each cell is taken where it moved farther. Half of a slope that is driven over counts, like this.
+    """
+    cells = np.flatnonzero(np.isfinite(before.lowest_m) & np.isfinite(between.lowest_m) & np.isfinite(after.lowest_m))
+    if len(cells) < MIN_CELLS:
+        return _moved_between(before, after)
+    first_m = between.lowest_m.take(cells) - before.lowest_m.take(cells)
+    second_m = after.lowest_m.take(cells) - between.lowest_m.take(cells)
+    return _fitted(cells, np.where(np.abs(first_m) > np.abs(second_m), first_m, second_m))
 
 
 def _fitted(cells: Int, values: Float32 | Float64) -> Float64:

@@ -110,7 +110,7 @@ class ReturnsCheck:
         return Loss(n_dead * 3 >= BANDS, f"no returns from {_bands(self._dead)} beams, in any direction")
 
     def _ended(self, samples: Sequence[Sample], usual: Float64, missing: Bool, axis: int) -> Bool:
-        """(n,) whether the returns of each sector or band ended at once, from one of the sweeps to the next.
+        """(n,) whether the returns of each sector or band ended at once, within one of the sweeps.
 
         Only those that are `missing` (n,) count. If all of them were already in the first sweep, none is looked for.
         """
@@ -118,7 +118,8 @@ class ReturnsCheck:
         if not (missing & (self._count(samples[0]).sum(axis=axis) > whole)).any():
             return np.zeros(len(usual), np.bool_)
         count = np.array([self._count(sample).sum(axis=axis) for sample in samples])
-        return np.asarray(((count[:-1] > whole) & (count[1:] < self._tuning.lost_share * usual)).any(axis=0))
+        least_of_two = np.minimum(count[1:], np.concatenate([count[2:], count[-1:]]))
+        return np.asarray(((count[:-1] > whole) & (least_of_two < self._tuning.lost_share * usual)).any(axis=0))
 
     def _thinned(self, count: Float64, least: float) -> Loss | None:
         """Returns that are missing everywhere alike."""

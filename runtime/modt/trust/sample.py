@@ -47,6 +47,7 @@ class Sample:
         weight: number of points for which one stands.
         plane: (3,) ground z = plane @ (1, x, y) as it was known before.
         T_world_sensor: (4, 4) pose.
+        pose_given: whether the frame came with a pose, so that the sweeps do not tell their own motion.
         R_level_sensor: (3, 3) from the sensor to the level frame, None if it is level.
     """
 
@@ -56,6 +57,7 @@ class Sample:
     weight: float
     plane: Float64
     T_world_sensor: Float64
+    pose_given: bool = True
     R_level_sensor: Float64 | None = None
 
     @cached_property
@@ -116,6 +118,10 @@ class Sample:
         return lowest_m
 
 
+Three = tuple[Sample, Sample, Sample]
+"""Three sweeps in a row."""
+
+
 def sample(frame: Frame, T_world_sensor: Float64, sensor: SensorConfig, plane: Float64) -> Sample:
     """The sample of a level frame over a ground (3,)."""
     n = len(frame.points)
@@ -123,7 +129,8 @@ def sample(frame: Frame, T_world_sensor: Float64, sensor: SensorConfig, plane: F
     weight = n / max(len(rows), 1)
     raw = frame.points.take(rows, axis=0)
     reach_m = REACH_SHARE * sensor.max_range_m
-    return Sample(frame.time_s, raw, reach_m, weight, plane, T_world_sensor, frame.R_level_sensor)
+    pose_given = frame.T_world_sensor is not None
+    return Sample(frame.time_s, raw, reach_m, weight, plane, T_world_sensor, pose_given, frame.R_level_sensor)
 
 
 def part_of_turn(turn: Float32, n: int) -> Int:

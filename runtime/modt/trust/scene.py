@@ -107,6 +107,7 @@ class SceneCheck:
         self.before: Sample | None = None
         self._agreed = 1.0  # share of the obstacle points that stood still at the last look
         self._looks = 0  # in a row in which the scene is back
+        self._compared: tuple[Sample, Sample, float] | None = None  # two sweeps, and the share that stood still
 
     def look(
         self,
@@ -117,19 +118,17 @@ class SceneCheck:
         *,
         on_moved_ground: bool = False,
     ) -> None:
-        """Notice a scene that changes at once, and one that is back; arguments as those of the ground's check.
+        """Notice a scene that changes at once, and one that is back; `pairs` of sweeps are at most one sweep apart.
 
         On a ground that has moved, obstacles are less sure, so a change has to explain nearly all of them. A scale is
         told by the ground alone.
         """
         tuning = self._tuning
-        agreed = agreement(first, now, self.change)
-        fell = agreed < tuning.suspected and agreed < self._agreed - tuning.fall
+        agreed = self._agreement(first, now)
+        fell = self._falls_to(agreed)
         self._agreed = agreed
-        if pairs and (fell or agreed < tuning.same or not self.change.is_none):
-            least, pair = self._least_agreeing(pairs, agreed)
-            if least < tuning.suspected:
-                self._explain(*pair, least, on_moved_ground=on_moved_ground)
+        if fell or agreed < tuning.same or not self.change.is_none:
+            self._notice(pairs, on_moved_ground=on_moved_ground)
         if self.before is None:
             return
         is_back = agreement(self.before, now, SAME) >= tuning.back or self._moves_as_before(first, now)
@@ -138,45 +137,61 @@ class SceneCheck:
             self.change = SAME
             self.before = None
 
-    def _least_agreeing(
-        self, pairs: Sequence[tuple[Sample, Sample]], agreed: float
-    ) -> tuple[float, tuple[Sample, Sample]]:
-        """Least share of the obstacle points that stood still within a pair, and the pair.
+    def may_have_changed(self, first: Sample, now: Sample) -> bool:
+        """Whether fewer obstacle points stood still than at the last look."""
+        agreed = self._agreement(first, now)
+        return agreed < self._tuning.same or self._falls_to(agreed)
 
-        The pairs are halved. Where enough points stood still from the first to the last sweep, no pair is looked at.
+    def _agreement(self, first: Sample, now: Sample) -> float:
+        """Share of the obstacle points that stood still between two sweeps, which are compared once."""
+        if self._compared is None or self._compared[0] is not first or self._compared[1] is not now:
+            self._compared = first, now, agreement(first, now, self._known_change(now))
+        return self._compared[2]
 
-        Args:
-            pairs: sweeps in a row.
-            agreed: the same share from the first to the last of them.
-        """
-        if len(pairs) == 1 or agreed >= self._tuning.suspected:
-            return agreed, pairs[-1]
-        middle = len(pairs) // 2
-        halves = (
-            self._least_agreeing(half, agreement(half[0][0], half[-1][1], self.change))
-            for half in (pairs[:middle], pairs[middle:])
-        )
-        return min(halves, key=lambda each: each[0])
+    def _known_change(self, now: Sample) -> Change:
+        """Change by which sweeps are compared. A pose that is registered by sweeps is one of the changed sensor."""
+        return self.change if now.pose_given else SAME
+
+    def _falls_to(self, agreed: float) -> bool:
+        return agreed < self._tuning.suspected and agreed < self._agreed - self._tuning.fall
 
     def _moves_as_before(self, first: Sample, now: Sample) -> bool:
-        """Whether obstacles move by the pose as in a scene that is not changed, and not as in the changed one."""
+        """Whether obstacles move by a given pose as in a scene that is not changed, and not as in the changed one."""
+        if not now.pose_given:
+            return False
         return agreement(first, now, SAME) > agreement(first, now, self.change) + self._tuning.better
 
-    def _explain(self, before: Sample, after: Sample, least: float, *, on_moved_ground: bool) -> None:
-        """Note how the scene changed from one sweep to the next."""
-        tuning = self._tuning
-        change, share = explain(before, after, self.change)
-        if on_moved_ground and change.is_scaled:
+    def _notice(self, pairs: Sequence[tuple[Sample, Sample]], *, on_moved_ground: bool) -> None:
+        """Note how the scene changed within one of the pairs, if it did.
+
+        What begins within a sweep falls into two pairs that follow one another, and only the pair around that sweep
+        shows all of it. Both may agree equally little, so the one to which an explanation adds most is taken.
+        """
+        agreed = np.array([agreement(before, after, self._known_change(after)) for before, after in pairs])
+        if not len(agreed) or agreed.min() >= self._tuning.suspected:
             return
-        other_scene = least < tuning.same and not on_moved_ground
+        least = int(agreed.argmin())
+        found = []
+        for k in range(max(least - 1, 0), min(least + 2, len(pairs))):
+            change, share = explain(*pairs[k], self._known_change(pairs[k][1]))
+            found.append((share - float(agreed[k]), k, change))
+        gain, k, change = max(found, key=lambda each: each[0])
+        if self._is_explained(change, float(agreed[k]), gain, on_moved_ground=on_moved_ground):
+            if self.before is None:
+                self.before = pairs[k][0]
+                self._looks = 0
+            self.change = self.change.then(change)
+
+    def _is_explained(self, change: Change, agreed: float, gain: float, *, on_moved_ground: bool) -> bool:
+        """Whether a change explains two sweeps, of which a share agrees without it, and more by a gain with it."""
+        tuning = self._tuning
+        if change.is_none or (on_moved_ground and change.is_scaled):
+            return False
+        other_scene = agreed < tuning.same and not on_moved_ground
         needed = tuning.explained if other_scene else tuning.surely_explained
         if self.change.then(change).is_none:  # the way back
             needed = 0.0
-        if share >= max(needed, least + tuning.better) and not change.is_none:
-            if self.before is None:
-                self.before = before
-                self._looks = 0
-            self.change = self.change.then(change)
+        return gain >= max(needed - agreed, tuning.better)
 
 
 def _cells(x: Float32, y: Float32, turn: Float32) -> Int:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
@@ -13,7 +12,7 @@ from modt.config import SensorConfig
 from modt.trust.ground import GroundCheck
 from modt.trust.lasting import BeamHistory, SectorHistory
 from modt.trust.returns import Loss, ReturnsCheck
-from modt.trust.sample import Sample, sample
+from modt.trust.sample import Sample, Three, sample
 from modt.trust.scene import SceneCheck
 from modt.trust.tuning import TrustTuning
 from modt.types import Float64, Frame, Reason, Trust, TrustLevel
@@ -90,6 +89,8 @@ class TrustWatch:
         self._debounced = Debounced(tuning.looks, tuning.back_looks)
         self._looked_s = -np.inf
         self._began_s: float | None = None
+        self._put_off = False  # the look that was due last
+        self._ground_moved = False  # between the last two looks
         self._repeated = False  # the sweep of the last look was one before
         self._before_loss: Sample | None = None  # the last sweep before the view was lost
         self._own_reasons: frozenset[str] = frozenset()  # checks of the sweeps themselves that have a reason
@@ -131,7 +132,7 @@ class TrustWatch:
             return self.trust
         self._samples = [*self._samples[-MOST_SAMPLES:], sweep]
         elapsed_s = now_s - self._looked_s
-        if elapsed_s >= self._tuning.look_s - 1e-3:
+        if elapsed_s >= self._tuning.look_s - 1e-3 and not self._changes_now():
             self._look(sweep, elapsed_s, others, learning=now_s - self._began_s < self._tuning.learn_s)
         return self.trust
 
@@ -152,6 +153,16 @@ class TrustWatch:
         self._samples = self._samples[-1:]
         self._looked_s = now_s
         self.trust = self._judged(now_s)
+
+    def _changes_now(self) -> bool:
+        """Whether to look at the next sweep instead, since something may have begun within the present one."""
+        first = self._samples[0]
+        now = self._samples[-1]
+        self._ground_moved = self._ground.has_moved(first, now)
+        changed = self._ground_moved or self._scene.may_have_changed(first, now)
+        soon = now.time_s - self._samples[-2].time_s <= MAX_SUDDEN_S
+        self._put_off = changed and soon and not self._put_off
+        return self._put_off
 
     def _judged(self, now_s: float) -> Trust:
         reasons = tuple(sorted(self._debounced.reasons.values(), key=lambda reason: (-reason.level, reason.since_s)))
@@ -198,10 +209,11 @@ class TrustWatch:
 
     def _follow(self) -> None:
         """Compare the sweeps since the last look with one another. Obstacles are told by the ground below them."""
-        pairs = [(a, b) for a, b in pairwise(self._samples) if b.time_s - a.time_s <= MAX_SUDDEN_S]
+        threes = list(_threes(self._samples))
+        pairs = [(before, after) for before, _, after in threes]
         first = self._samples[0]
         ground = self._ground.present
-        self._ground.look(first, self._samples[-1], pairs, self._tuning.back_looks)
+        self._ground.look(self._samples[-1], threes if self._ground_moved else (), self._tuning.back_looks)
         moves = bool((self._ground.present != ground).any())
         if moves:  # the obstacles of this sweep, the first one of the next look, stand on it as it is after the step
             self._samples[-1] = replace(self._samples[-1], plane=self._ground.present)
@@ -238,6 +250,13 @@ SUDDEN_CHECKS = frozenset({"scene", "ground"})
 """Checks whose finding is a step between two frames, which is not waited for twice."""
 REPEATED_SHARE = 0.5
 """Share of the returns whose x is that of the sweep before, to the last bit, above which a sweep repeats it."""
+
+
+def _threes(samples: Sequence[Sample]) -> Iterator[Three]:
+    """Three sweeps in a row each, of which a step tells that it came at once."""
+    for before, between, after in zip(samples, samples[1:], samples[2:], strict=False):
+        if max(between.time_s - before.time_s, after.time_s - between.time_s) <= MAX_SUDDEN_S:
+            yield before, between, after
 
 
 def _repeated(before: Sample, now: Sample) -> bool:
