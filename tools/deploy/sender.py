@@ -2,7 +2,8 @@
 
     python -m tools.deploy.sender PORT [DRIVE]
 
-It writes a line when it begins to send, and ends with its standard input.
+The recording is sent forwards and backwards in turn, since a robot that leaps from its end to its begin would be a
+fault of its own. It writes a line when it begins to send, and ends with its standard input.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from threading import Thread
 import numpy as np
 
 from modt.app.inputs import Request, stream
+from modt_simulation.sensors import sensor
+from modt_simulation.synthetic_stream import SyntheticStream
 from tools.deploy.faults import FAULTS, NO_FAULT, Fault
 from tools.options import parser
 from tools.send.faults import Timed
@@ -28,7 +31,8 @@ from tools.send.loops import VelodyneStamps, turn_loop
 from tools.send.packets import send
 
 MODEL = "vlp-16"
-FRAMES = 50
+FRAMES = 150
+"""Number of frames that are sent."""
 
 
 class Faulty:
@@ -73,15 +77,20 @@ def paced(packets: Iterable[Timed]) -> Iterator[Timed]:
         yield at_s, payload
 
 
+def yard() -> SyntheticStream:
+    """A drive at the pace of a robot, so that it can turn back from one sweep to the next."""
+    return SyntheticStream("yard", MODEL, FRAMES * sensor(MODEL).period_s)
+
+
 def main() -> None:
     options = parser(__doc__)
     options.add_argument("port", type=int, metavar="PORT", help="UDP port of this machine")
-    options.add_argument(
-        "drive", nargs="?", type=Path, metavar="DRIVE", help="recording (default: a synthetic street)"
-    )
+    options.add_argument("drive", nargs="?", type=Path, metavar="DRIVE", help="recording (default: a simulated yard)")
     args = options.parse_args()
-    recording = stream(Request(path=args.drive, frames=(0, FRAMES)))
-    payloads = [payload for _, payload in packets_of(list(recording), MODEL, recording.info.period_s)]
+    drive = stream(Request(path=args.drive, frames=(0, FRAMES))) if args.drive else yard()
+    there = list(drive)
+    back = there[-2:0:-1]
+    payloads = [payload for _, payload in packets_of([*there, *back], MODEL, drive.info.period_s)]
     faulty = Faulty()
     Thread(target=faulty.apply_named, args=(sys.stdin,), daemon=True).start()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as to:
