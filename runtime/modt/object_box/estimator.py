@@ -159,6 +159,7 @@ class WholeBoxes(SeenBoxes):
         """
         tuning = self.tuning.heading
         first = proposals.offsets[of_rows]
+        # Every stride-th point of a proposal; divisions are rounded up.
         stride = -(-(proposals.offsets[of_rows + 1] - first) // tuning.max_fit_points)
         count = -(-(proposals.offsets[of_rows + 1] - first) // stride)
         starts = count.cumsum() - count
@@ -194,6 +195,8 @@ class WholeBoxes(SeenBoxes):
     def _turn(self, state: ObjectBoxes, motion: Motion, seen: Seen) -> None:
         """Turn the headings to the fitted rectangles, then to the motion of those that move."""
         tuning = self.tuning.heading
+        # The fit comes before the motion, which overrules it. What stands then turns by 90 degrees where its evidence
+        # speaks against the axis; length and width change places with it.
         evidence = self._axis_evidence(seen)
         new = ~state.estimated
         first = np.where(evidence[:, None] >= 0, seen.long_side, _left_of(seen.long_side))
@@ -223,7 +226,7 @@ class WholeBoxes(SeenBoxes):
         def likelihood(side_m: Float64, axis: int) -> Float64:
             off = side_m - usual_m[:, axis]
             square = off * off / variance[:, axis]
-            part = 1 + square / 3
+            part = 1 + square / 3  # a heavy tail: a shorter side may be a part of any longer one
             fitting: Float64 = tuning.whole_side_evidence / (part * part)
             return np.where(off > 0, tuning.whole_side_evidence - square / 2, fitting)
 
@@ -322,6 +325,7 @@ class WholeBoxes(SeenBoxes):
         part = 1 + missing * missing
         whole = 1 / (1 + tuning.doubt * (part * part))
         noise_m = np.array([tuning.length_noise_m, tuning.width_noise_m, tuning.height_noise_m])
+        # Weight of what is seen against the usual length, by their variances.
         trust = spread_m * spread_m / (spread_m * spread_m + noise_m * noise_m)
         at_least_m = np.maximum(more_m, 0.0)
         size_m: Float64 = usual_m + (at_least_m + whole * (trust * more_m - at_least_m))

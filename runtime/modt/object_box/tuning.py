@@ -1,6 +1,6 @@
 """Chosen values of the boxes of whole objects: what each does to the result, its unit, and what it was chosen on.
 
-The usual sizes of the classes stand in `modt.classes`.
+The usual sizes of the classes stand in `modt.class_sizes`.
 """
 
 from __future__ import annotations

@@ -61,7 +61,7 @@ class LandmarkMap:
         self._frames[self._held] = np.maximum(self._frames[self._held], self._tuning.established_frames)
 
     def update(self, tracks: StaticTracks) -> Landmarks:
-        """Add the last frame and return the landmarks; to be called once in each frame without a pose."""
+        """Add the last frame and return the landmarks; to be called once in each frame."""
         self._renumber(tracks.id)
         self._add(tracks)
         # The landmarks are the candidates among the tracks, in their order.

@@ -63,6 +63,7 @@ def connect(grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32, use: Bool) ->
     from scipy.sparse import csr_array  # large, and the compiled kernels do without
     from scipy.sparse.csgraph import connected_components
 
+    # Indices from here on are ranks among the used cells, until `component[used]` at the end.
     used = slice(None) if use.all() else np.flatnonzero(use)
     low = cells.low[used]
     high = cells.high[used]
@@ -236,11 +237,13 @@ class CellClusterer:
         its other sizes include what left.
         """
         max_gap_m = np.float32(self.gap.max_gap_m) + np.float32(self.gap.max_gap_beams) * beam_m
+        # 1. The coarse grid holds far objects together, whose returns are sparse. It also joins neighbours.
         cluster = connect_coarse(self.coarse, cells, max_gap_m)
         sizes = ClusterSizes.of_cells(cells, sampled, beam_m, cluster)
         oversized = sizes.extent_m >= np.float32(self.structure.oversized_m)
         divided = oversized | self._may_hold_person(sizes)
 
+        # 2. Clusters that it may have joined wrongly are tried on the fine grid.
         part = connect(self.fine, cells, max_gap_m, divided.take(cluster))
         parts = ClusterSizes.of_cells(cells, sampled, beam_m, part)
         of_oversized = oversized.take(cluster.take(parts.cell))
@@ -248,6 +251,7 @@ class CellClusterer:
         leaves = of_oversized | self._may_be_person(parts)
         cluster, sizes = moved(cells, cluster, sizes, part, parts, leaves)
 
+        # 3. What stands before the long surfaces of the clusters that are left leaves them.
         free, before_m = self._before_surfaces(cells, sampled, cluster, sizes)
         part = connect(self.fine, cells, max_gap_m, free)
         parts = ClusterSizes.of_cells(cells, sampled, beam_m, part)
@@ -280,7 +284,7 @@ class CellClusterer:
             if on_surface.any():
                 before_m[rows] = distance_m
             elif canopy:
-                before_m[rows] = FAR_M
+                before_m[rows] = FAR_M  # finite: what stands below a canopy may leave it
             else:
                 continue
             free[rows] = ~on_surface
@@ -370,6 +374,7 @@ def members_of(
         kind: (N,) PointKind of all points of the sweep, into which those of the points go.
     """
     cluster = np.full(len(index), NONE)
+    # Tall clusters come first, so that the low ones replace them where both have a point.
     for first, at, clusters in ((0, np.arange(len(tall.cell_of_point)), tall), (tall.n, places, low)):
         kind[index[at]] = clusters.kind_of_cell.take(clusters.cell_of_point)
         of_cell = np.where(clusters.cluster_of_cell == NONE, NONE, clusters.cluster_of_cell + first)
@@ -397,11 +402,11 @@ def low_points(
     side = grid.side // 2 + 1
     kind = np.where(tall.sampled.sqrt_range < np.float32(max_sqrt_range), tall.kind_of_cell, PointKind.GROUND)
     cells = np.flatnonzero((kind == PointKind.MEMBER) | (kind == PointKind.STRUCTURE))
-    standing = np.full(side * side, NONE)
+    standing = np.full(side * side, NONE)  # by wide cell: a tall point of an object or a structure in it
     standing[_wide(tall.cells.row[cells], tall.cells.column[cells], side)] = tall.sample[cells]
     left_over = np.flatnonzero(((kind == PointKind.LOW) | (kind == PointKind.SPARSE)).take(tall.cell_of_point))
     wide = _wide(*grid.row_column(points), side)
-    low = wide[len(points) - len(is_clear) :]
+    low = wide[len(points) - len(is_clear) :]  # of the low points, which are the last
     has_clear = np.zeros(side * side, np.bool_)
     has_clear[low[is_clear]] = True
     used = np.flatnonzero(has_clear[low] | (standing[low] != NONE))

@@ -71,6 +71,7 @@ class Clusterer:
         cluster, sizes = self.kernels.cluster(self.cells, found.cells, found.sampled, found.air.beam_m)
         cluster, sizes = self._people_split_off(cluster, sizes, found.cells, found.sampled, found.air.beam_m)
         found = replace(found, cluster_of_cell=cluster, n=len(sizes))
+        # Strips are merged before clusters are judged, since a strip alone may be too low to be an object.
         unseen_m = self._unseen_m(found)
         is_member = self._kind(sizes, unseen_m) == PointKind.MEMBER
         strip = (is_member | ~sizes.of_oversized) & self.may_be_strips(sizes)

@@ -135,8 +135,9 @@ class SqrtRangeGrid:
     def neighbour_pairs(self, index: Int) -> tuple[Int, Int32]:
         """Pairs (i, j) of the cells at (C,) flat indices that share a side or a corner, each once, sorted by i."""
         self.number[index] = np.arange(len(index), dtype=np.int32)
+        # Four of the eight neighbours: the other four have the cell among theirs, and each pair is wanted once.
         ahead = np.array([1, self.side - 1, self.side, self.side + 1])
         found = self.number.take((index[:, None] + ahead).ravel())
         self.number[index] = NONE
         pair = np.flatnonzero(found != NONE)
-        return pair >> 2, found.take(pair)
+        return pair >> 2, found.take(pair)  # each cell has four places in `found`

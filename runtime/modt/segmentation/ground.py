@@ -258,13 +258,15 @@ class GroundEstimator:
         height = np.concatenate([foot, np.where(is_ground, lowest, np.inf)])  # of a cell: one row on
         ring = np.arange(-1, self.grid.rings)
         range_m = self.range_m(height, np.maximum(ring, 0)[:, None])
+        # Nodes are the ground cells of a ray, and its foot, which is row 0. Flat indices rise with the row, so
+        # running extremes along a ray give the last node up to each cell, and the first one behind it.
         is_node = np.concatenate([np.ones_like(is_ground[:1]), is_ground])
         node = np.arange(is_node.size).reshape(is_node.shape)
         before = np.maximum.accumulate(np.where(is_node, node, 0), axis=0)[:-1]
         after = np.minimum.accumulate(np.where(is_node, node, node.size)[::-1], axis=0)[::-1][1:]
         beyond = after == node.size
         after = np.where(beyond, before, after)
-        range_m[0] = 0.0
+        range_m[0] = 0.0  # of the foot
         range_before = range_m.take(before)
         height_before = height.take(before)
         since = self.grid.edge_m[:-1, None] - range_before
@@ -314,19 +316,24 @@ class Rays:
         tuning = self.ground.tuning
         lowest = self.lowest[ring]
         max_slope = self.ground.max_slope
+        # How far each return is from the line that its ray was on, extrapolated no farther than max_gap_m.
         gap = range_m - self.range_m
         residual = lowest - self.height_m - self.slope * np.minimum(gap, tuning.max_gap_m)
+        # It continues its own ray. Before a ray has met any ground, the cell right behind has to be flat as well.
         rise_range_m = np.where(self.beside_ramp, np.float32(tuning.max_gap_m), np.float32(tuning.near_m))
         may_rise = flat & (flat_behind | (self.range_m > 0))
         found: Bool = residual < np.minimum(gap, rise_range_m) * max_slope * may_rise + tuning.noise_m
         may_fall = residual > -(gap * max_slope + tuning.noise_m)
         found &= may_fall
+        # Or it continues the ground of a ray beside it. Only ground that is sure itself can be continued.
         below = residual < -tuning.noise_m
         beside = self._continues_beside(lowest, range_m, found & (flat | ~below))
         found |= beside & flat & (residual < gap * self.ground.hill_slope)
+        # Or it is the lowest visible part of something whose foot a crest hides. Then the ground is still lower.
         stands = ~flat & may_fall
         hidden = ~beside & stands & below & (gap > tuning.near_m)
         np.copyto(lowest, _lowered(lowest, tuning.hidden_m), where=hidden)
+        # The running slope is a mean in which each stretch counts by its length.
         rise = lowest - self.height_m
         slope = self.slope + (rise - self.slope * gap) / (gap + np.float32(tuning.slope_length_m))
         steepest = self.ground.hill_slope

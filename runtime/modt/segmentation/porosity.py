@@ -64,6 +64,7 @@ class RayDensity:
         part = (row * DIRECTIONS + direction)[inside]
         of_part = np.bincount(part, solid_angle[inside], self._rows * DIRECTIONS).reshape(self._rows, -1)
         self.in_view |= of_part.any(axis=0)
+        # Of each row of parts, the densest but LEFT_OUT of them; of all rows, the densest one.
         densest = float(np.sort(of_part)[:, -1 - self.LEFT_OUT].max())
         self.density = min(max(self.density, densest / (self.PART_RAD * self._row_rad)), 1.0)
 

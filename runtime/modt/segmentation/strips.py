@@ -33,6 +33,7 @@ class ViewBounds:
         """
         direction = pseudo_angle(points.x, points.y)
         range_m = np.square(points.sqrt_range)
+        # The pseudo-angle is y / (|x| + |y|), so a radian is range^2 / (|x| + |y|)^2 of its units.
         scale_m = np.square(np.abs(points.x) + np.abs(points.y)) / range_m
         return cls(
             groups.min(np.stack([direction, range_m, low, (low + ground) / range_m])),
@@ -138,5 +139,6 @@ def _overlapping(start: Float32, end: Float32) -> tuple[Int, Int]:
     order = np.argsort(start, kind="stable")
     followers = np.searchsorted(start[order], end[order], side="right") - np.arange(1, len(order) + 1)
     place = np.repeat(np.arange(len(order)), followers)
+    # Number of each pair among those of its interval, from 0 on: the pairs before it, less those of intervals before.
     rank = np.arange(len(place)) - np.repeat(np.cumsum(followers) - followers, followers)
     return order[place], order[place + 1 + rank]

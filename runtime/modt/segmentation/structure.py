@@ -69,7 +69,8 @@ def _best_line(x: Float64, y: Float64, tuning: StructureTuning) -> Line | None:
             cosine, sine, distance_m = lines[:, near.argmax()].tolist()
             best = cosine, sine, distance_m
     for _ in range(tuning.refinements):
-        best = best and _refined(best, x, y, tuning.thickness_m)
+        if best is not None:
+            best = _refined(best, x, y, tuning.thickness_m)
     return best
 
 

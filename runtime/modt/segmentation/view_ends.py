@@ -34,6 +34,8 @@ class ViewEnds:
         self._reach_m = max(self._near_m, self._blind_m)
         self._tangents = np.array([-np.inf, np.inf])
         if sensor.span_deg is not None:
+            # Below the lowest beam the sensor's own height is hidden, above the highest one the rest of a person. The
+            # beam passes beyond both at the range where it has fallen, or risen, by that much.
             outward = np.array([-1.0, 1.0])  # the lowest beam, and the highest
             span_rad = np.deg2rad(sensor.span_deg)
             tangents = np.tan(span_rad)

@@ -85,7 +85,7 @@ class Hiding:
     ) -> Bool:
         """(2, R) whether rows (R,) are hidden where they are expected, and where they were before the time step."""
         moved = tracks.x[rows, :2] - tracks.kdop_position[rows]
-        box = tracks.box[np.tile(rows, 2)]
+        box = tracks.box[np.tile(rows, 2)]  # as last seen, which is at kdop_position
         box[:, :2] += np.concatenate([moved, moved - dt_s * tracks.velocity[rows]])
         hidden = self._sight.hides(nearest, transform_boxes(inverse(T_world_sensor), box))
         return hidden.reshape(2, -1)

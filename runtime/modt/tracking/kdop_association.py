@@ -60,6 +60,7 @@ class KdopAssociation:
             self._weights,
         )
         max_cost = self._tuning.max_cost
+        # Indices are pairs: first those of like shape by cost, then, of what is left over, those that overlap.
         first = (cost < max_cost).nonzero()[0]
         first = first[self._kernels.assign(rows[first], columns[first], cost[first], max_cost)]
         second = (coverage > self._tuning.min_overlap).nonzero()[0]

@@ -77,6 +77,7 @@ class MotionFilter:
         """All tracks dt_s later: mixing, then the motion of each hypothesis."""
         step = Step.over(dt_s, self.tuning)
         p = tracks.moving_probability
+        # By Bayes' rule: what moves now has just started, and what rests now has just stopped, with these shares.
         moving = p * (1 - step.stops) + (1 - p) * step.starts
         self._predict(tracks, step, (1 - p) * step.starts / moving, p * step.stops / (1 - moving))
         p[:] = moving
@@ -157,6 +158,7 @@ class MotionFilter:
         ahead = np.stack([np.ones_like(speed), np.zeros_like(speed)])
         np.divide(mean[VELOCITY:], speed, out=ahead, where=speed > 0)
         along, across = _variances(covariance[VELOCITY:, VELOCITY:], ahead)
+        # The variance of the heading is that of the velocity across it, over its square; pi^2 is an unknown heading.
         unknown = np.pi * np.pi
         heading = np.full(len(speed), unknown)
         np.divide(across, speed * speed, out=heading, where=across < unknown * (speed * speed))
@@ -216,12 +218,14 @@ def _moved(x: Float64, P: Float64, dt_s: float, tuning: MotionFilterTuning) -> t
     ahead = tuning.relative_acceleration_sigma_per_s**2 - turn_variance
     for i in IN_PLANE:
         x[i] += dt_s * x[i + VELOCITY]
+    # The motion: P becomes F P F', with the covariances from before it.
     velocity = P[VELOCITY:, VELOCITY:].copy()
     cross = P[:VELOCITY, VELOCITY:].copy()
     for i in IN_PLANE:
         for k in IN_PLANE:
             P[i, k] += dt_s * (cross[i, k] + cross[k, i]) + dt2 * velocity[i, k]
             P[i, k + VELOCITY] += dt_s * velocity[i, k]
+    # The acceleration: `across` in every direction, and `ahead` more along the velocity.
     for i in IN_PLANE:
         for k in IN_PLANE:
             noise = (across if i == k else 0.0) + ahead * (v[i] * v[k])

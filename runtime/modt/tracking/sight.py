@@ -74,6 +74,7 @@ class Sight:
             bearing = _bearing(x, y)
             range_m = np.sqrt(x * x + y * y)
             centre = int(_bearing(*proposals.centroid[proposal, :2].astype(np.float32)[:, None])[0])
+            # Bearings from the centre, from -BEARINGS / 2 on, so that nothing wraps within a proposal.
             off = (bearing - centre + 3 * BEARINGS // 2) % BEARINGS - BEARINGS // 2
             for side, sign in enumerate((-1, 1)):
                 outermost = (sign * off).max()

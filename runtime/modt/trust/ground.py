@@ -102,6 +102,7 @@ class GroundCheck:
         self._add_steps(threes)
         if self._before is None:
             return
+        # By the sweep before the step, as long as the place is the same, or by the known plane, with a closer bound.
         as_before = self._size(_moved_between(self._before, now)) < BACK_SHARE
         is_back = as_before or self._size(self._from_plane(now)) < KNOWN_SHARE
         self._looks = self._looks + 1 if is_back else 0

@@ -87,7 +87,7 @@ class ReturnsCheck:
         blind = n_lost >= tuning.blind_share * max(n_expected, 1)
         enough = n_lost >= tuning.degraded_sectors  # few that are lost are none, whether they ended at once or not
         self._lost = lost & (self._lost | self._ended(samples, usual, lost, 1) if enough else self._lost)
-        if not blind:
+        if not blind:  # a view that is lost is reported however slowly it ended
             lost = self._lost
             n_lost = int(np.count_nonzero(lost))
         if n_lost < tuning.degraded_sectors:

@@ -245,7 +245,7 @@ def explain(before: Sample, after: Sample, known_change: Change) -> tuple[Change
     shift reaches, so it may be a little greater than that of the chosen one.
     """
     known, cells = places(before, after, known_change)
-    n = RANGES + 20
+    n = RANGES + 20  # room along the range, which does not close as the bearing does
     wide = np.zeros((BEARINGS, n))
     wide[:, :RANGES] = _grown(known)
     spectrum = np.conj(np.fft.rfft2(wide))
@@ -255,6 +255,7 @@ def explain(before: Sample, after: Sample, known_change: Change) -> tuple[Change
         if mirrored:
             bearing = BEARINGS - 1 - bearing
         now = np.bincount(bearing * n + far, minlength=BEARINGS * n).reshape(BEARINGS, n).astype(np.float64)
+        # Points on known places for every turn and scale at once: the cross-correlation of both grids.
         hits = np.fft.irfft2(spectrum * np.fft.rfft2(now), s=wide.shape) / max(len(cells), 1)
         scales = np.arange(n)
         scales[n // 2 :] -= n
