@@ -43,6 +43,7 @@ EXPORT i64 modt_occupied_cells(const PointColumns *points, const float *height, 
     i32 *const table = grid->table;
     const i32 centre = grid->centre, side = grid->side;
     i32 count = 0;
+    /* 1. The place of each point, which it claims: the last of a cell keeps it. */
     for (i64 i = 0; i < n; i++) {
         float scale = grid->cells_per_unit / points->sqrt_range[i];
         cell[i] = place_in_table(line_of(points->x[i], scale, centre), line_of(points->y[i], scale, centre), side);
@@ -52,6 +53,7 @@ EXPORT i64 modt_occupied_cells(const PointColumns *points, const float *height, 
         __builtin_prefetch(&table[cell[i + AHEAD < n ? i + AHEAD : i]], 1);
         table[cell[i]] = (i32)i;
     }
+    /* 2. Those last points are the samples. Their cells begin with them, and are numbered in the table. */
     for (i64 i = 0; i < n; i++) {
         sample[count] = i; /* overwritten by the next, unless it is the last one of its cell */
         count += table[cell[i]] == i;
@@ -67,6 +69,7 @@ EXPORT i64 modt_occupied_cells(const PointColumns *points, const float *height, 
         cells->entries[c] = 0;
         table[cell[last]] = c;
     }
+    /* 3. Every point looks up the number of its cell, and extends it. */
     float *low = cells->low, *high = cells->high;
     for (i64 i = 0; i < n; i++) {
         i64 c = cell[i] = table[cell[i]];
@@ -115,7 +118,7 @@ static ALWAYS_INLINE i32 cell_at(const CellMap *map, i32 at)
     return c >= 0 && c < map->n && map->place[c] == at ? c : NONE;
 }
 
-/* PorosityFinder._columns */
+/* PorosityFinder._rays_across */
 static ALWAYS_INLINE float columns_at(float rays_sqrt_range, float sqrt_range)
 {
     return maxf(rays_sqrt_range / sqrt_range, 1.0f);
@@ -260,6 +263,7 @@ EXPORT i64 modt_low_points(const Grid *grid, const PointColumns *points, const u
     const i32 centre = grid->centre, side = grid->side / 2 + 1;
     const i64 n_tall = tall->n_points;
     i64 n = 0, used;
+    /* 1. Empty the part of the table that the points reach, and enter what stands. */
     float reach = max_sqrt_range; /* of all points that are looked at */
     for (i64 i = n_tall; i < n_tall + n_low; i++)
         reach = maxf(reach, points->sqrt_range[i]);
@@ -274,6 +278,7 @@ EXPORT i64 modt_low_points(const Grid *grid, const PointColumns *points, const u
         if (kind == MEMBER_KIND || kind == STRUCTURE_KIND)
             table[(cells->row[c] >> 1) * side + (cells->column[c] >> 1)] = (i32)sample[c];
     }
+    /* 2. Candidates: tall points that are left over, then all low ones, each with its wide cell. */
     for (i64 i = 0; i < n_tall; i++) {
         places[n] = i; /* overwritten by the next, unless it is left over */
         n += is_left_over[tall->cell_of_point[i]];
@@ -289,12 +294,14 @@ EXPORT i64 modt_low_points(const Grid *grid, const PointColumns *points, const u
         if (i >= n_tall && is_clear[i - n_tall] && table[beside[p]] == NONE)
             table[beside[p]] = CLEAR;
     }
+    /* 3. Of the low ones those stay whose wide cell holds something. */
     used = n;
     for (i64 p = n; p < n + n_low; p++) {
         places[used] = places[p]; /* overwritten by the next, unless it is used */
         beside[used] = beside[p];
         used += table[beside[p]] != NONE;
     }
+    /* 4. What stands in or beside the wide cell: CLEAR and NONE are less than any place. */
     for (i64 p = 0; p < used; p++) {
         const i32 *wide = table + beside[p];
         i32 greatest = NONE;
@@ -536,7 +543,7 @@ static void find_components(const Span *spans, i32 n, i32 side, i32 *latest, i32
                 join(parent, ancestors[j], least);
 
         /* Span k - 1 goes into `latest` only now: if it is the left neighbour, the entry of its column had to be
-         * `behind_left` until here. */
+         * the one before until here. */
         latest[column_before] = k - 1;
         column_before = column;
     }
@@ -674,15 +681,16 @@ static void move_parts(const Cells *cells, const ClusterScratch *s, i64 n_used, 
 
 /* CellClusterer._before_surfaces, of n clusters: uses the cells that are free, and sets their `before_m`. Returns how
  * many they are. */
-static i64 find_free_cells(const ClusterRules *rules, const StructureRules *r, const PersonSize *person,
+static i64 find_free_cells(const ClusterRules *rules, const StructureRules *surfaces, const PersonSize *person,
                            const Cells *cells, const PointColumns *sampled, i64 n_cells, const i64 *cluster,
                            const ClusterSizes *sizes, i64 n, const ClusterScratch *s)
 {
+    /* 1. Clusters that are tried, by a 0 in `next`, and their cells, in `used`. */
     i32 *const next = s->next_of_cluster, rows = 0;
     for (i64 g = 0; g < n; g++) {
         int tried = sizes->points[g] >= 2 * rules->min_points && sizes->top_m[g] > person->min_top_m &&
-                    sizes->extent_m[g] >= r->min_extent_m &&
-                    sizes->sqrt_range[g] * sizes->sqrt_range[g] < r->max_range_m;
+                    sizes->extent_m[g] >= surfaces->min_extent_m &&
+                    sizes->sqrt_range[g] * sizes->sqrt_range[g] < surfaces->max_range_m;
         next[g] = tried ? 0 : NONE;
     }
     i64 n_tried = 0, n_free = 0;
@@ -691,6 +699,7 @@ static i64 find_free_cells(const ClusterRules *rules, const StructureRules *r, c
         s->used[n_tried] = (i32)i; /* overwritten by the next, unless its cluster is tried */
         n_tried += next[cluster[i]] != NONE;
     }
+    /* 2. Their cells by cluster: `next` counts them, becomes the start of each cluster, and moves on to its end. */
     for (i64 k = 0; k < n_tried; k++)
         next[cluster[s->used[k]]]++;
     for (i64 g = 0; g < n; g++)
@@ -701,17 +710,18 @@ static i64 find_free_cells(const ClusterRules *rules, const StructureRules *r, c
         }
     for (i64 k = 0; k < n_tried; k++)
         s->cell_of_row[next[cluster[s->used[k]]]++] = s->used[k];
+    /* 3. Surfaces of each. What hangs in a canopy is neither on a surface nor free. */
     i32 start = 0;
     for (i64 g = 0; g < n && rows; g++) {
         if (next[g] == NONE)
             continue;
         i32 end = next[g], hanging = 0, m = 0;
         for (i32 k = start; k < end; k++)
-            hanging += cells->low[s->cell_of_row[k]] > r->hanging_m;
-        int canopy = hanging >= r->min_hanging * (end - start);
+            hanging += cells->low[s->cell_of_row[k]] > surfaces->hanging_m;
+        int canopy = hanging >= surfaces->min_hanging * (end - start);
         for (i32 k = start; k < end; k++) {
             i32 i = s->cell_of_row[k];
-            if (canopy && cells->low[i] > r->hanging_m)
+            if (canopy && cells->low[i] > surfaces->hanging_m)
                 continue;
             s->row_cells[m] = i;
             s->x[m] = sampled->x[i];
@@ -719,7 +729,7 @@ static i64 find_free_cells(const ClusterRules *rules, const StructureRules *r, c
             s->width_m[m++] = rules->step * sampled->sqrt_range[i];
         }
         start = end;
-        i64 found = find_surfaces(r, s->x, s->y, s->width_m, m, &s->surface, s->on_surface, s->distance_m);
+        i64 found = find_surfaces(surfaces, s->x, s->y, s->width_m, m, &s->surface, s->on_surface, s->distance_m);
         if (!found && !canopy)
             continue;
         for (i32 k = 0; k < m; k++) {
@@ -727,6 +737,7 @@ static i64 find_free_cells(const ClusterRules *rules, const StructureRules *r, c
             s->before_m[s->row_cells[k]] = found ? (float)s->distance_m[k] : FAR_M;
         }
     }
+    /* 4. The free ones, in their order. */
     for (i64 k = 0; k < n_tried; k++) {
         i32 i = s->used[k];
         s->used[n_free] = i; /* overwritten by the next, unless it is free */
@@ -736,7 +747,7 @@ static i64 find_free_cells(const ClusterRules *rules, const StructureRules *r, c
 }
 
 /* CellClusterer._leaves_surface: sets `cluster_of_part` of those that leave, which are numbered from n on. */
-static void find_leaving(const ClusterRules *rules, const StructureRules *r, const PersonSize *person, i64 n_used,
+static void find_leaving(const ClusterRules *rules, const StructureRules *surfaces, const PersonSize *person, i64 n_used,
                          const i64 *cluster, const ClusterSizes *sizes, i64 n, const ClusterSizes *parts, i64 n_parts,
                          const ClusterScratch *s)
 {
@@ -752,16 +763,16 @@ static void find_leaving(const ClusterRules *rules, const StructureRules *r, con
         s->front_m[p] = maxf(before_m, s->front_m[p]);
         s->back_m[p] = minf(before_m, s->back_m[p]);
     }
-    const float thickness_m = (float)r->thickness_m;
+    const float thickness_m = (float)surfaces->thickness_m;
     for (i64 p = 0; p < n_parts; p++) {
         float front_m = s->front_m[p], back_m = s->back_m[p];
         float extent_m = sizes->extent_m[cluster[parts->cell[p]]];
-        int across = back_m < -thickness_m && front_m > -thickness_m && front_m - back_m > r->min_across_m;
-        int before = (front_m > r->min_before_m || across) && back_m > -r->max_behind_m;
-        int possible = may_be_person_part(rules, person, parts, p) && parts->bottom_m[p] < r->max_bottom_m;
-        int stands_out = parts->points[p] >= r->min_part_points && parts->top_m[p] >= r->min_part_top_m &&
-                         parts->extent_m[p] >= r->min_part_extent_m;
-        int leaves = (before && (possible || (extent_m >= r->oversized_m && stands_out))) ||
+        int across = back_m < -thickness_m && front_m > -thickness_m && front_m - back_m > surfaces->min_across_m;
+        int before = (front_m > surfaces->min_before_m || across) && back_m > -surfaces->max_behind_m;
+        int possible = may_be_person_part(rules, person, parts, p) && parts->bottom_m[p] < surfaces->max_bottom_m;
+        int stands_out = parts->points[p] >= surfaces->min_part_points && parts->top_m[p] >= surfaces->min_part_top_m &&
+                         parts->extent_m[p] >= surfaces->min_part_extent_m;
+        int leaves = (before && (possible || (extent_m >= surfaces->oversized_m && stands_out))) ||
                      (extent_m >= rules->max_extent_m && stands_out);
         s->cluster_of_part[p] = leaves ? (i32)(n + p) : NONE;
     }
@@ -873,13 +884,13 @@ static inline float width_of(const ViewBounds *bounds, i64 a, i64 b)
 }
 
 /* strips.fits, of strips a and b together; b may be a */
-static inline int fits(const StripRules *r, const ViewBounds *bounds, i64 a, i64 b)
+static inline int fits(const StripRules *rules, const ViewBounds *bounds, i64 a, i64 b)
 {
     float width = width_of(bounds, a, b), near = minf(bounds->min[RANGE][a], bounds->min[RANGE][b]);
     float depth = maxf(bounds->max[RANGE][a], bounds->max[RANGE][b]) - near;
     float top = maxf(bounds->max[HEIGHT][a], bounds->max[HEIGHT][b]);
-    return width * width + depth * depth < r->max_diagonal_m * r->max_diagonal_m && width < r->max_width_m &&
-           top < r->max_top_m;
+    return width * width + depth * depth < rules->max_diagonal_m * rules->max_diagonal_m && width < rules->max_width_m &&
+           top < rules->max_top_m;
 }
 
 static inline int may_be_person(const PersonSize *person, const ViewBounds *bounds, i64 a)
@@ -888,36 +899,38 @@ static inline int may_be_person(const PersonSize *person, const ViewBounds *boun
 }
 
 /* Whether two strips that overlap in direction are a pair of strips.pairs; `near` is not farther than `far` */
-static int one_car(const StripRules *r, const PersonSize *person, const ViewBounds *bounds, const float *beam_rad,
+static int one_car(const StripRules *rules, const PersonSize *person, const ViewBounds *bounds, const float *beam_rad,
                    i64 near, i64 far)
 {
     float gap_beams = (bounds->min[ELEVATION][far] - bounds->max[ELEVATION][near]) / beam_rad[far];
-    return bounds->min[RANGE][far] - bounds->max[RANGE][near] < r->max_gap_m && gap_beams > r->min_gap_beams &&
-           gap_beams < r->max_gap_beams && !may_be_person(person, bounds, near) &&
-           !may_be_person(person, bounds, far) && fits(r, bounds, near, far) &&
-           width_of(bounds, near, far) > r->min_width_m &&
-           maxf(bounds->max[HEIGHT][near], bounds->max[HEIGHT][far]) > r->min_top_m &&
-           minf(bounds->min[HEIGHT][near], bounds->min[HEIGHT][far]) < r->max_bottom_m;
+    return bounds->min[RANGE][far] - bounds->max[RANGE][near] < rules->max_gap_m && gap_beams > rules->min_gap_beams &&
+           gap_beams < rules->max_gap_beams && !may_be_person(person, bounds, near) &&
+           !may_be_person(person, bounds, far) && fits(rules, bounds, near, far) &&
+           width_of(bounds, near, far) > rules->min_width_m &&
+           maxf(bounds->max[HEIGHT][near], bounds->max[HEIGHT][far]) > rules->min_top_m &&
+           minf(bounds->min[HEIGHT][near], bounds->min[HEIGHT][far]) < rules->max_bottom_m;
 }
 
 /* merge_strips: first of the strips that make one car with each of n. `order` is that of their least directions,
  * in which the strips that overlap one in direction follow it. Scratch: `parent`, and the bounds of the cars, each
  * at its first. */
-EXPORT void modt_merge_strips(const StripRules *r, const PersonSize *person, const ViewBounds *bounds,
+EXPORT void modt_merge_strips(const StripRules *rules, const PersonSize *person, const ViewBounds *bounds,
                               const float *beam_rad, i64 n, const i64 *order, i32 *parent, const ViewBounds *cars,
                               i64 *target)
 {
     for (i64 g = 0; g < n; g++)
         parent[g] = (i32)g;
+    /* 1. Strips of one car are joined; a strip beyond the end of another one overlaps none that follows it. */
     for (i64 k = 0; k < n; k++)
         for (i64 later = k + 1; later < n; later++) {
             i64 a = order[k], b = order[later];
             if (!(bounds->min[DIRECTION][b] <= bounds->max[DIRECTION][a]))
                 break;
             int swap = bounds->min[RANGE][b] < bounds->min[RANGE][a];
-            if (one_car(r, person, bounds, beam_rad, swap ? b : a, swap ? a : b))
+            if (one_car(rules, person, bounds, beam_rad, swap ? b : a, swap ? a : b))
                 join(parent, (i32)a, (i32)b);
         }
+    /* 2. Bounds of each car, from its first strip on, which comes before the others. */
     for (i64 g = 0; g < n; g++) {
         i32 first = parent[g] = parent[parent[g]];
         for (int v = 0; v < VIEW; v++) {
@@ -927,5 +940,5 @@ EXPORT void modt_merge_strips(const StripRules *r, const PersonSize *person, con
         cars->scale_m[first] = bounds->scale_m[first];
     }
     for (i64 g = 0; g < n; g++)
-        target[g] = fits(r, cars, parent[g], parent[g]) ? parent[g] : g;
+        target[g] = fits(rules, cars, parent[g], parent[g]) ? parent[g] : g;
 }

@@ -52,6 +52,7 @@ static void move(double x[N_STATE], double P[N_STATE][N_STATE], double dt_s, dou
     const double across = acceleration_variance + turn_variance * (v[0] * v[0] + v[1] * v[1]);
     const double ahead = speed_variance - turn_variance;
     double cross[2][2];
+    /* The motion: P becomes F P F', with the covariances from before it. */
     for (int i = 0; i < 2; i++) {
         x[i] += dt_s * x[i + VX];
         for (int k = 0; k < 2; k++)
@@ -62,6 +63,7 @@ static void move(double x[N_STATE], double P[N_STATE][N_STATE], double dt_s, dou
             P[i][k] += dt_s * (cross[i][k] + cross[k][i]) + dt2 * P[i + VX][k + VX];
             P[i][k + VX] += dt_s * P[i + VX][k + VX];
         }
+    /* The acceleration: `across` in every direction, and `ahead` more along the velocity. */
     for (int i = 0; i < 2; i++)
         for (int k = 0; k < 2; k++) {
             const double noise = (i == k ? across : 0.0) + ahead * (v[i] * v[k]);
@@ -140,6 +142,7 @@ EXPORT void modt_combine_motion(const double (*moving)[N_STATE], const double (*
         double mean[N_STATE] = {resting[m][X], resting[m][Y]}, P[N_STATE][N_STATE] = {{0.0}};
         const double share = probability[m], keep = 1 - share, spread = share * keep;
         double step[N_STATE];
+        /* The mean of a mixture: what rests, at a velocity of 0, takes in a share of what moves. */
         for (int i = 0; i < N_STATE; i++) {
             step[i] = moving[m][i] - mean[i];
             mean[i] += share * step[i];
@@ -149,6 +152,7 @@ EXPORT void modt_combine_motion(const double (*moving)[N_STATE], const double (*
                 double rest = i < VX && k < VX ? resting_P[m][i][k] : 0.0;
                 P[i][k] = (keep * rest + share * moving_P[m][i][k]) + spread * step[i] * step[k];
             }
+        /* Variances of the velocity along it and across it, which are those of the speed and of the heading. */
         const double vx = mean[VX], vy = mean[VX + 1], speed = __builtin_sqrt(vx * vx + vy * vy);
         const double x = speed > 0 ? vx / speed : 1.0, y = speed > 0 ? vy / speed : 0.0;
         const double xx = P[VX][VX], xy = P[VX][VX + 1], yy = P[VX + 1][VX + 1];

@@ -134,7 +134,7 @@ static void place_points(const Ground *g, const u4 *points, i64 n, float *restri
     }
 }
 
-/* GroundEstimator._lowest and the maxima of _spread, of up to BLOCK points. Afterwards the cell of points out of
+/* GroundEstimator._lowest and the highest returns of GroundEstimator.heights, of up to BLOCK points. Afterwards the cell of points out of
  * bounds of range, and of places of the block without a point, is the one after the last. */
 static void find_ends(const Ground *g, float height_m, i64 n, const float *z, const float *sqrt_range, i32 *cell,
                       float (*ends)[2])
@@ -143,6 +143,7 @@ static void find_ends(const Ground *g, float height_m, i64 n, const float *z, co
     float candidate[BLOCK][2];
     float positions_per_unit = g->rings_per_unit * POSITIONS;
     i32 outside = g->rings * g->sectors;
+    /* 1. What each point offers its cell. */
     for (i64 i = 0; i < n; i++) {
         float reach = sqrt_range[i] * sqrt_range[i] * g->hill_slope + g->noise_m;
         int plausible = (magnitude(z[i] + height_m) < reach) & (sqrt_range[i] > g->min_sqrt_range);
@@ -155,6 +156,7 @@ static void find_ends(const Ground *g, float height_m, i64 n, const float *z, co
         cell[i] = outside;
         candidate[i][0] = candidate[i][1] = INFINITY;
     }
+    /* 2. The least offer of each cell. */
     for (i64 k = 0; k < APART; k++) /* neighbours share cells: those far apart do not wait for one another */
         for (i64 i = k; i < BLOCK; i += APART) {
             PROVEN(cell[i] >= 0 && cell[i] <= outside);
@@ -162,6 +164,7 @@ static void find_ends(const Ground *g, float height_m, i64 n, const float *z, co
             of_cell[0] = minf(candidate[i][0], of_cell[0]);
             of_cell[1] = minf(candidate[i][1], of_cell[1]);
         }
+    /* 3. Points out of bounds count above, and are left out from here on. */
     for (i64 i = 0; i < n; i++) {
         int used = (sqrt_range[i] > g->min_sqrt_range) & (sqrt_range[i] < g->max_sqrt_range);
         cell[i] = used ? cell[i] : outside;
@@ -383,6 +386,7 @@ static void smooth(const Ground *g, const GroundScratch *s, const float *top)
 {
     i32 sectors = g->sectors, cells = g->rings * sectors;
     float *median = s->rays, *beside = median + sectors, *round = beside + sectors; /* the last has two rows */
+    /* From the last ring inwards: the outer edge of a ring is the inner edge of the one after it, smoothed already. */
     for (i32 row = cells - sectors; row >= 0; row -= sectors) {
         float *surface = s->surface + row;
         median_across(sectors, 1, surface, round, median);
@@ -423,6 +427,7 @@ static i64 keep_points(const Ground *g, const GroundScratch *s, const u4 *points
     int8_t *kind = out->kind + start;
     float below[BELOW][BLOCK], height[BLOCK], low = g->min_height_m, high = g->max_height_m;
     uint8_t is_kept[BLOCK + GROUP] = {0}, is_low[BLOCK + GROUP] = {0}, is_clear[BLOCK];
+    /* 1. The surface of the cell of each point, by columns. */
     for (i64 i = 0; i < BLOCK; i += 4) {
         u4 of_point[4], column[4];
         for (int k = 0; k < 4; k++)
@@ -431,6 +436,7 @@ static i64 keep_points(const Ground *g, const GroundScratch *s, const u4 *points
         for (int v = 0; v < BELOW; v++)
             *(u4 *)(below[v] + i) = column[v];
     }
+    /* 2. Heights, and from them the kinds. An infinite surface gives a height of -infinity: out of range. */
     for (i64 i = 0; i < n; i++) {
         float share = s->sqrt_range[start + i] * g->rings_per_unit - (float)(cell[i] >> bits);
         height[i] = s->z[start + i] - (below[INNER][i] + (below[OUTER][i] - below[INNER][i]) * share);
@@ -444,6 +450,7 @@ static i64 keep_points(const Ground *g, const GroundScratch *s, const u4 *points
         is_low[i] = (height[i] <= low) & (height[i] > below[FOOT][i]);
         is_clear[i] = height[i] > below[CLEAR][i];
     }
+    /* 3. Those kept are written a group at a time where all or none of it stay, which is most often so. */
     for (i64 first = 0; first < n; first += GROUP) {
         i64 row = start + first;
         uint64_t kept_group, low_group;

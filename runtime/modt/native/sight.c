@@ -51,6 +51,7 @@ EXPORT void modt_bounded_sides(const float (*nearest)[SLOPES], const float *coor
         const double range_m = maxd(__builtin_sqrt(seen[0] * seen[0] + seen[1] * seen[1]), 1e-3);
         const double bottom_m = seen[2] - seen[5] / 2;
         const i64 low = slope_at(bottom_m + LOW_SHARE * seen[5], range_m), high = slope_at(bottom_m + seen[5], range_m);
+        /* The outermost bearing of the members on each side of the centre, and the nearest return there. */
         i64 outermost[2] = {-BEARINGS, -BEARINGS}; /* clockwise and counter-clockwise */
         float end_m[2] = {INFINITY, INFINITY};
         for (i64 i = offsets[proposal]; i < offsets[proposal + 1]; i++) {
@@ -67,6 +68,7 @@ EXPORT void modt_bounded_sides(const float (*nearest)[SLOPES], const float *coor
                     end_m[side] = minf(end_m[side], distance_m);
             }
         }
+        /* What is seen right beside it: nearer, or the same surface. */
         for (int side = 0; side < 2; side++) {
             float beside_m = INFINITY;
             for (i64 k = 1; k <= BESIDE; k++) {

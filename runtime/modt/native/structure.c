@@ -5,12 +5,12 @@ typedef struct {
     double cosine, sine, distance_m; /* of the normal; distance of the sensor along it */
 } Line;
 
-void place_surface_scratch(i64 n, uintptr_t *end, SurfaceScratch *s)
+void place_surface_scratch(i64 n, uintptr_t *end, SurfaceScratch *scratch)
 {
-    TAKE(end, s->rest, n);
-    TAKE(end, s->near, n);
-    TAKE(end, s->along_m, n);
-    TAKE(end, s->length_m, n);
+    TAKE(end, scratch->rest, n);
+    TAKE(end, scratch->near, n);
+    TAKE(end, scratch->along_m, n);
+    TAKE(end, scratch->length_m, n);
 }
 
 /* Number of n points, a multiple of LANES, that are within `thickness_m` of a line */
@@ -63,15 +63,15 @@ static int refine(Line *line, const double *x, const double *y, const i32 *near,
 }
 
 /* _best_line of the n rows `rest`; 0 without one. `near` is scratch. */
-static int best_line(const StructureRules *r, const double *x, const double *y, const i32 *rest, i64 n, i32 *near,
+static int best_line(const StructureRules *rules, const double *x, const double *y, const i32 *rest, i64 n, i32 *near,
                      Line *line)
 {
     enum { LANES = 8 };
     static const i64 paired[] = {16, 3}; /* PAIRED */
     float sample_x[MAX_SAMPLE + LANES], sample_y[MAX_SAMPLE + LANES];
-    if (n < r->min_cells)
+    if (n < rules->min_cells)
         return 0;
-    i64 stride = (n + r->max_cells - 1) / r->max_cells, count = 0;
+    i64 stride = (n + rules->max_cells - 1) / rules->max_cells, count = 0;
     for (i64 k = 0; k < n; k += stride) {
         sample_x[count] = (float)x[rest[k]];
         sample_y[count++] = (float)y[rest[k]];
@@ -86,18 +86,18 @@ static int best_line(const StructureRules *r, const double *x, const double *y, 
             i64 other = (k + count / paired[p] + 1) % count;
             float dx = sample_x[other] - sample_x[k], dy = sample_y[other] - sample_y[k];
             float base_m = __builtin_sqrtf(dx * dx + dy * dy);
-            if (!(base_m > r->min_base_m))
+            if (!(base_m > rules->min_base_m))
                 continue;
             float cosine = -dy / base_m, sine = dx / base_m;
             float distance_m = sample_x[k] * cosine + sample_y[k] * sine;
-            i32 n_near = votes(sample_x, sample_y, padded, cosine, sine, distance_m, (float)r->thickness_m);
+            i32 n_near = votes(sample_x, sample_y, padded, cosine, sine, distance_m, (float)rules->thickness_m);
             if (n_near > most) {
                 most = n_near;
                 *line = (Line){cosine, sine, distance_m};
             }
         }
-    for (i32 k = 0; most && k < r->refinements; k++)
-        most = refine(line, x, y, near, near_line(line, x, y, rest, n, r->thickness_m, near));
+    for (i32 k = 0; most && k < rules->refinements; k++)
+        most = refine(line, x, y, near, near_line(line, x, y, rest, n, rules->thickness_m, near));
     return most > 0;
 }
 
@@ -119,7 +119,7 @@ static void sort_rows(const double *along_m, i32 *order, i64 n)
 }
 
 /* _long_runs of n rows, sorted by position, whose lengths are at the rows too. Marks those kept; returns how many. */
-static i64 long_runs(const StructureRules *r, const double *along_m, const double *length_m, const i32 *order, i64 n,
+static i64 long_runs(const StructureRules *rules, const double *along_m, const double *length_m, const i32 *order, i64 n,
                      uint8_t *on_surface, double *first_m, double *last_m)
 {
     i64 kept = 0;
@@ -127,18 +127,18 @@ static i64 long_runs(const StructureRules *r, const double *along_m, const doubl
         double filled_m = 0.0;
         for (end = start + 1; end < n; end++) {
             double gap_m = along_m[order[end]] - along_m[order[end - 1]];
-            if (gap_m > r->max_gap_m)
+            if (gap_m > rules->max_gap_m)
                 break;
             filled_m += mind(gap_m, 2 * length_m[order[end - 1]]);
         }
         double run_m = along_m[order[end - 1]] - along_m[order[start]];
-        if (!(run_m >= r->min_length_m && filled_m >= r->min_filled * run_m))
+        if (!(run_m >= rules->min_length_m && filled_m >= rules->min_filled * run_m))
             continue;
         for (i64 piece = start, next; piece < end; piece = next) {
             for (next = piece + 1; next < end; next++)
-                if (along_m[order[next]] - along_m[order[next - 1]] > r->piece_gap * length_m[order[next]])
+                if (along_m[order[next]] - along_m[order[next - 1]] > rules->piece_gap * length_m[order[next]])
                     break;
-            if (!(along_m[order[next - 1]] - along_m[order[piece]] >= r->min_piece_m))
+            if (!(along_m[order[next - 1]] - along_m[order[piece]] >= rules->min_piece_m))
                 continue;
             *first_m = kept ? *first_m : along_m[order[piece]];
             *last_m = along_m[order[next - 1]];
@@ -150,40 +150,44 @@ static i64 long_runs(const StructureRules *r, const double *along_m, const doubl
     return kept;
 }
 
-i64 find_surfaces(const StructureRules *r, const double *x, const double *y, const double *width_m, i64 n,
-                  const SurfaceScratch *s, uint8_t *on_surface, double *before_m)
+i64 find_surfaces(const StructureRules *rules, const double *x, const double *y, const double *width_m, i64 n,
+                  const SurfaceScratch *scratch, uint8_t *on_surface, double *before_m)
 {
     i64 found = 0;
     for (i64 i = 0; i < n; i++) {
         on_surface[i] = 0;
         before_m[i] = INFINITY;
     }
-    for (i32 lines = 0; lines < r->max_lines; lines++) {
+    for (i32 lines = 0; lines < rules->max_lines; lines++) {
+        /* 1. The best line of the cells that are on no surface yet, and those of them that are near it. */
         i64 rest = 0;
         Line line;
         for (i64 i = 0; i < n; i++) {
-            s->rest[rest] = (i32)i;
+            scratch->rest[rest] = (i32)i;
             rest += !on_surface[i];
         }
-        if (!best_line(r, x, y, s->rest, rest, s->near, &line))
+        if (!best_line(rules, x, y, scratch->rest, rest, scratch->near, &line))
             break;
-        i64 near = near_line(&line, x, y, s->rest, rest, r->thickness_m, s->near);
+        i64 near = near_line(&line, x, y, scratch->rest, rest, rules->thickness_m, scratch->near);
         for (i64 k = 0; k < near; k++) {
-            i32 i = s->near[k];
+            i32 i = scratch->near[k];
             double along_m = y[i] * line.cosine - x[i] * line.sine;
-            s->along_m[i] = along_m;
-            s->length_m[i] = width_m[i] * (1 + __builtin_fabs(along_m) / __builtin_sqrt(x[i] * x[i] + y[i] * y[i]));
+            scratch->along_m[i] = along_m;
+            scratch->length_m[i] = width_m[i] * (1 + __builtin_fabs(along_m) / __builtin_sqrt(x[i] * x[i] + y[i] * y[i]));
         }
-        sort_rows(s->along_m, s->near, near);
+        /* 2. Long runs of these along the line are a surface. */
+        sort_rows(scratch->along_m, scratch->near, near);
         double first_m = 0.0, last_m = 0.0;
-        i64 kept = long_runs(r, s->along_m, s->length_m, s->near, near, on_surface, &first_m, &last_m);
+        i64 kept = long_runs(rules, scratch->along_m, scratch->length_m, scratch->near, near, on_surface, &first_m,
+                             &last_m);
         if (!kept)
             break;
         found += kept;
+        /* 3. How far each cell is before it, on the side of the sensor. */
         for (i64 i = 0; i < n; i++) {
             double off_m = x[i] * line.cosine + y[i] * line.sine - line.distance_m;
             double along_m = y[i] * line.cosine - x[i] * line.sine;
-            if (along_m > first_m - r->beside_m && along_m < last_m + r->beside_m)
+            if (along_m > first_m - rules->beside_m && along_m < last_m + rules->beside_m)
                 before_m[i] = mind(before_m[i], line.distance_m > 0 ? -off_m : off_m);
         }
     }
