@@ -47,9 +47,7 @@ class JointView:
         tuning: which proposals are one.
     """
 
-    def __init__(
-        self, parts: Sequence[SensorPart], kernels: Kernels, tuning: JoiningTuning = JoiningTuning()
-    ) -> None:
+    def __init__(self, parts: Sequence[SensorPart], kernels: Kernels, tuning: JoiningTuning) -> None:
         self._parts = parts
         self._kernels = kernels
         self._tuning = tuning

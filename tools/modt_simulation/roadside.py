@@ -123,14 +123,14 @@ def crossing_pedestrians(builder: SceneBuilder, road: Road, x: float, n: int) ->
         builder.walker(ends, speed, rng.uniform(-0.8 * speed * builder.seconds, far))
 
 
-def cyclists(builder: SceneBuilder, road: Road, near_m: float, n: int) -> None:
-    """Add cyclists at both edges of the carriageway, around near_m."""
+def cyclists(builder: SceneBuilder, road: Road) -> None:
+    """Add two cyclists at each edge of the carriageway, around x = 0."""
     rng = builder.rng
     for side in (-1, 1):
         line = road.lane(side * (road.half_m - 1.35), backwards=side > 0)
-        s = near_m - road.start_m if side < 0 else road.end_m - near_m
+        s = -road.start_m if side < 0 else road.end_m
         s += rng.uniform(-30.0, 10.0)
-        for _ in range(n):
+        for _ in range(2):
             speed = rng.uniform(3.0, 5.5)
             builder.cyclist(Path.steady(line, s, speed, builder.seconds), speed)
             s += rng.uniform(8.0, 40.0)

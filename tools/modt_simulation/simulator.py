@@ -107,7 +107,7 @@ AIR_SEMANTIC = 1
 class Receiver:
     """The receiver of a sensor; rng draws the constant errors of its beams, `reflectivity` is that by material."""
 
-    def __init__(self, sensor: SensorModel, rng: Generator, reflectivity: Float32 = REFLECTIVITY) -> None:
+    def __init__(self, sensor: SensorModel, rng: Generator, reflectivity: Float32) -> None:
         self.sensor = sensor
         self.reflectivity = reflectivity
         self.bias = rng.normal(0.0, sensor.beam_sigma_m, (sensor.shape[0], 1)).astype(np.float32)

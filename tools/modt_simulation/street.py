@@ -27,7 +27,7 @@ def street(rng: Generator, seconds: float, height_m: float) -> World:
     time, travelled = timetable(seconds, speed, LEAD_IN_M)
     road = residential(rng, float(travelled[-1]))
     builder = SceneBuilder(rng, seconds)
-    roadside.cyclists(builder, road, 0.0, 2)
+    roadside.cyclists(builder, road)
     roadside.crossing_pedestrians(builder, road, rng.uniform(20.0, 50.0), int(rng.integers(0, 4)))
     roadside.traffic(builder, road, 0.0, float(speed.mean()))
     share = rng.uniform(0.3, 0.75)
@@ -91,7 +91,7 @@ def _populate(builder: SceneBuilder, road: Road) -> None:
     stop = road.gaps[0][1] + 1.5
     for x in (-stop, stop):
         roadside.crossing_pedestrians(builder, road, x, int(rng.integers(2, 6)))
-    roadside.cyclists(builder, road, 0.0, 2)
+    roadside.cyclists(builder, road)
     roadside.traffic(builder, road, 15.0, rng.uniform(4.0, 7.0))
     share = rng.uniform(0.2, 0.6)
     for side in (-1, 1):

@@ -44,7 +44,7 @@ def simulated_scans(
     times_s: Sequence[float],
     *,
     camera: bool,
-    sensors: Sequence[str] = (profile.DEFAULT,),
+    sensors: Sequence[str],
 ) -> Iterator[Scan]:
     """Sweeps at the given times of a short drive through each scene, for each seed, by one sensor after another."""
     in_turn = cycle(sensors)

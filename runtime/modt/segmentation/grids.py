@@ -64,7 +64,7 @@ class PolarGrid:
         tuning: width of a ring, and what is flat in a cell.
     """
 
-    def __init__(self, max_range_m: float, tuning: PolarGridTuning = PolarGridTuning()) -> None:
+    def __init__(self, max_range_m: float, tuning: PolarGridTuning) -> None:
         self.ring_step = tuning.ring_step
         self.rings_per_unit = 1 / tuning.ring_step  # [1/sqrt(m)]
         self.rings = int(np.sqrt(max_range_m) / tuning.ring_step) + 2

@@ -13,7 +13,7 @@ import numpy as np
 from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.cells import AirOfCells, CellClusterer, Clusters, ClusterSizes
 from modt.segmentation.groups import consecutive
-from modt.segmentation.kernels import NUMPY, Above, Kernels
+from modt.segmentation.kernels import Above, Kernels
 from modt.segmentation.tuning import CellTuning, LowTuning, SplitTuning
 from modt.types import NONE, Int, Int8, PointKind
 
@@ -35,13 +35,7 @@ class LowFinder:
         tuning: bounds on low things.
     """
 
-    def __init__(
-        self,
-        sensor: SensorConfig,
-        config: SegmentationConfig,
-        kernels: Kernels = NUMPY,
-        tuning: LowTuning = LowTuning(),
-    ) -> None:
+    def __init__(self, sensor: SensorConfig, config: SegmentationConfig, kernels: Kernels, tuning: LowTuning) -> None:
         self.kernels = kernels
         self.tuning = tuning
         self.max_sqrt_range = math.sqrt(tuning.max_range_m)

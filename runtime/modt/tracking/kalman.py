@@ -20,7 +20,7 @@ X, Y, HEADING, SPEED = range(4)
 
 
 def components_first(x: Float64, P: Float64) -> tuple[Float64, Float64]:
-    """(n, M) and (n, n, M), as the filter takes them, of a table's (M, n) and (M, n, n)."""
+    """(n, M) and (n, n, M), each number a contiguous row over all tracks, of a table's (M, n) and (M, n, n)."""
     return x.T.copy(), P.transpose(1, 2, 0).copy()
 
 

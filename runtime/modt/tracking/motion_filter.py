@@ -19,7 +19,7 @@ import numpy as np
 from modt.class_sizes import IS_PERSON
 from modt.geometry.kernels import GeometryKernels
 from modt.native.declarations import declare
-from modt.tracking.kalman import HEADING, SPEED, X, Y
+from modt.tracking.kalman import HEADING, SPEED, X, Y, components_first
 from modt.tracking.track_table import TrackTable
 from modt.tracking.tuning import MotionFilterTuning
 from modt.types import Float64, Int
@@ -119,8 +119,8 @@ class MotionFilter:
     def _predict(self, tracks: TrackTable, step: Step, resting_share: Float64, moving_share: Float64) -> None:
         """Mix the hypotheses by shares (M,) of the other one, and predict both."""
         tuning = self.tuning
-        m, P = _columns(tracks.moving_mean, tracks.moving_covariance)
-        r, S = _columns(tracks.resting_mean, tracks.resting_covariance)
+        m, P = components_first(tracks.moving_mean, tracks.moving_covariance)
+        r, S = components_first(tracks.resting_mean, tracks.resting_covariance)
         mixed = _mixed(m, P, *_started(r, S, tuning.start_sigma_mps**2), resting_share)
         resting = _mixed(r, S, m[:VELOCITY], P[:VELOCITY, :VELOCITY], moving_share)
         _write(tracks.moving_mean, tracks.moving_covariance, *_moved(*mixed, step.dt_s, tuning))
@@ -132,12 +132,12 @@ class MotionFilter:
     def _update(self, tracks: TrackTable, rows: Int, position: Float64, noise: Float64) -> tuple[Fit, Fit]:
         """Update both hypotheses; how well the moving and the resting one expected the positions."""
         fits = []
-        z, R = _columns(position, noise)
+        z, R = components_first(position, noise)
         for mean, covariance in (
             (tracks.moving_mean, tracks.moving_covariance),
             (tracks.resting_mean, tracks.resting_covariance),
         ):
-            x, P = _columns(mean.take(rows, axis=0), covariance.take(rows, axis=0))
+            x, P = components_first(mean.take(rows, axis=0), covariance.take(rows, axis=0))
             x, P, fit = _filtered(x, P, z, R)
             mean[rows] = x.T
             covariance[rows] = P.transpose(2, 0, 1)
@@ -146,8 +146,8 @@ class MotionFilter:
 
     def _combine(self, tracks: TrackTable) -> None:
         """Write the means of both hypotheses, all but the heading."""
-        m, C = _columns(tracks.moving_mean, tracks.moving_covariance)
-        r, S = _columns(tracks.resting_mean, tracks.resting_covariance)
+        m, C = components_first(tracks.moving_mean, tracks.moving_covariance)
+        r, S = components_first(tracks.resting_mean, tracks.resting_covariance)
         mean, covariance = _mixed(*_started(r, S, 0.0), m, C, tracks.moving_probability)
         vx, vy = mean[VELOCITY:]
         speed = np.sqrt(vx * vx + vy * vy)
@@ -173,11 +173,6 @@ def _variances(C: Float64, ahead: Float64) -> tuple[Float64, Float64]:
     x, y = ahead
     xx, xy, yy = C[0, 0], C[0, 1], C[1, 1]
     return (xx * x + xy * y) * x + (xy * x + yy * y) * y, (xx * y - xy * x) * y + (yy * x - xy * y) * x
-
-
-def _columns(x: Float64, P: Float64) -> tuple[Float64, Float64]:
-    """(n, M) and (n, n, M) of (M, n) and (M, n, n): each number is a contiguous row over all tracks."""
-    return x.T.copy(), P.transpose(1, 2, 0).copy()
 
 
 def _write(mean: Float64, covariance: Float64, x: Float64, P: Float64) -> None:
@@ -300,6 +295,6 @@ def _state(tracks: TrackTable) -> tuple[Float64, Float64, Float64, Float64]:
     return tracks.moving_mean, tracks.moving_covariance, tracks.resting_mean, tracks.resting_covariance
 
 
-def motion_filter_of(kernels: GeometryKernels, tuning: MotionFilterTuning = MotionFilterTuning()) -> MotionFilter:
+def motion_filter_of(kernels: GeometryKernels, tuning: MotionFilterTuning) -> MotionFilter:
     """The filter: native if the kernels have a library, else in NumPy."""
     return MotionFilter(tuning) if kernels.library is None else NativeMotionFilter(kernels.library, tuning)

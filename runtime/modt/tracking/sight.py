@@ -161,6 +161,6 @@ class NativeSight(Sight):
         self._library.modt_look(points, kind, len(points), every, nearest)
 
 
-def sight_of(kernels: GeometryKernels, tuning: SightTuning = SightTuning()) -> Sight:
+def sight_of(kernels: GeometryKernels, tuning: SightTuning) -> Sight:
     """Lines of sight: native if the kernels have a library, else in NumPy."""
     return Sight(tuning) if kernels.library is None else NativeSight(kernels.library, tuning)

@@ -86,7 +86,7 @@ FASTEST = 1
 """Level of the fastest compression."""
 
 
-def live_message(result: FrameResult, costs: dict[str, Any], status: str = "") -> str:
+def live_message(result: FrameResult, costs: dict[str, Any], status: str) -> str:
     """Line of JSON for a frame, with the status of the run."""
     frame = {
         "frame": result.frame.index,

@@ -110,7 +110,7 @@ def track_sequence(
     period_s: float,
     least_confidence: float | None = None,
     *,
-    online: bool = False,
+    online: bool,
 ) -> tuple[str, int]:
     """KITTI tracking results of a sequence, and the number of its tracks.
 

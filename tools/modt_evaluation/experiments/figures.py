@@ -206,7 +206,7 @@ class ObjectLengths:
         return cls(*(np.bincount(which, minlength=len(names)) for which in (unit, followed, broken)))
 
 
-def track_lengths(judged: Judged, at: float | None = None) -> Iterator[Figure]:
+def track_lengths(judged: Judged, at: float | None) -> Iterator[Figure]:
     """Lengths of the tracks of objects, and the events that end them early."""
     found = ObjectLengths.of(judged)
     if not len(found.wanted):

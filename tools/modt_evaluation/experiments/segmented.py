@@ -177,7 +177,7 @@ class IdealTracking(PlayedBack):
 
     state_names = ("followed",)
 
-    def __init__(self, drive: SegmentedDrive, config: ProfileConfig, range_m: float = np.inf) -> None:
+    def __init__(self, drive: SegmentedDrive, config: ProfileConfig, range_m: float) -> None:
         super().__init__(drive, range_m)
         rows = _ideal_tracks(drive, config.tracking, config.sensor.period_s)
         self._rows = iter(rows)

@@ -255,7 +255,7 @@ _STEP_W = 0.02  # one step of the converter
 _FACTS = Facts("Raspberry Pi 5 PMIC", "V x A", _STEP_W, 50.0, Scope.MODULE, Kind.INTEGRATED, privilege="group video")
 
 
-def find_pmic(command: str = "vcgencmd") -> list[Candidate]:
+def find_pmic(command: str) -> list[Candidate]:
     """The power chip of a Raspberry Pi 5, where the command of the firmware is installed.
 
     Loads on the 5 V rail itself (USB, HATs, the fan) and the loss of the chip are not included. A reading takes a few
