@@ -32,6 +32,11 @@ def stages_of(**request):
     return Stages(Request(**{"profile": ("vlp-16",), **request}), INFO, Ledger(), live=True)
 
 
+def step(stages, frame):
+    """Result of a whole frame, as many calls as it asks for."""
+    return stages.step(frame, UNLIMITED, reduced=False)
+
+
 CALLS = ("view.segment", "odometry.locate", "tracker.track", "fusion.observe", "fusion.asks", "scheduler.select")
 CALLS += ("classifier.classify", "fusion.fuse", "decision.decide", "tracker.confirm")
 
@@ -55,7 +60,7 @@ def test_a_failure_of_any_stage_costs_its_frame_and_no_track(call, after, monkey
             if frame.index in (8, 9):
                 patch.setattr(getattr(stages.pipeline, stage), method, fail)
             try:
-                result = stages.step(frame, UNLIMITED, reduced=False)
+                result = step(stages, frame)
             except RuntimeError:
                 failures += 1
                 patch.undo()
@@ -78,18 +83,18 @@ def test_a_clock_that_steps_costs_no_track(posed):
     pose = np.eye(4) if posed else None
     for given in frames()[:15]:
         frame = dataclasses.replace(given, T_world_sensor=pose, steady_s=given.stamp_s)
-        expected = steady.step(frame, UNLIMITED, reduced=False)
+        expected = step(steady, frame)
         step_s = 3600.0 * (frame.index >= 6) - 7200.0 * (frame.index >= 12)
-        result = stepping.step(dataclasses.replace(frame, stamp_s=frame.stamp_s + step_s), UNLIMITED, reduced=False)
+        result = step(stepping, dataclasses.replace(frame, stamp_s=frame.stamp_s + step_s))
         assert result.tracks.id.tolist() == expected.tracks.id.tolist()
         np.testing.assert_array_equal(result.tracks.x, expected.tracks.x)
 
 
 def test_renewed_stages_begin_without_tracks_and_never_give_an_id_twice():
     stages = stages_of()
-    before = [stages.step(frame, UNLIMITED, reduced=False) for frame in frames()[:5]]
+    before = [step(stages, frame) for frame in frames()[:5]]
     stages.recover(anew=True)
-    after = stages.step(frames()[5], UNLIMITED, reduced=False)
+    after = step(stages, frames()[5])
     assert not set(after.tracks.id.tolist()) & {i for r in before for i in r.tracks.id.tolist()}
 
 
@@ -99,7 +104,7 @@ def test_a_reload_takes_the_new_profile_and_keeps_the_tracks(tmp_path):
     own.write_text(profile.to_yaml(profile.dump(base)))
     stages = stages_of(profile=str(own))
     for frame in frames()[:8]:
-        before = stages.step(frame, UNLIMITED, reduced=False)
+        before = step(stages, frame)
     text = own.read_text()
     own.write_text(text.replace("calls_per_frame: 24", "calls_per_frame: 0"))
     stages.reload()
@@ -154,7 +159,7 @@ def test_a_first_sweep_that_cannot_be_compared_keeps_the_profile_and_a_later_one
         stages.choose_profile(first)
     assert stages.chosen is began_with
     assert "cannot be compared" in stages._findings()["profile"].cause
-    assert len(stages.step(first, UNLIMITED, reduced=False).proposals)
+    assert len(step(stages, first).proposals)
     with pytest.raises(MisuseError, match="installation"):
         awaited(stages, dataclasses.replace(first, steady_s=2.0))
     installation(gone=False)
@@ -177,7 +182,7 @@ def test_an_exchanged_sensor_that_cannot_be_compared_is_said_until_it_can(instal
         awaited(stages, dataclasses.replace(other, steady_s=2.0))
     assert stages.chosen is chosen
     assert "cannot be compared" in stages._findings()["profile"].cause
-    stages.step(dataclasses.replace(other, T_world_sensor=None), UNLIMITED, reduced=False)
+    step(stages, dataclasses.replace(other, T_world_sensor=None))
     installation(gone=False)
     awaited(stages, dataclasses.replace(other, steady_s=4.0))
     assert stages.chosen is not chosen
@@ -186,11 +191,11 @@ def test_an_exchanged_sensor_that_cannot_be_compared_is_said_until_it_can(instal
 
 def test_stages_that_cannot_be_renewed_go_on_without_tracks(installation):
     stages = stages_of()
-    before = [stages.step(frame, UNLIMITED, reduced=False) for frame in frames()[:5]]
+    before = [step(stages, frame) for frame in frames()[:5]]
     installation(gone=True)
     with pytest.raises(MisuseError, match="installation"):
         stages.recover(anew=True)
-    after = stages.step(frames()[5], UNLIMITED, reduced=False)
+    after = step(stages, frames()[5])
     assert not set(after.tracks.id.tolist()) & {i for r in before for i in r.tracks.id.tolist()}
 
 
@@ -238,7 +243,7 @@ def test_a_reload_keeps_the_sensor_that_the_first_sweep_showed():
     assert stages.pipeline is not made
 
 
-def test_a_reload_of_compare_profiless_profile_is_a_reason_until_the_right_one_is_loaded(tmp_path):
+def test_a_reload_of_another_sensors_profile_is_a_reason_until_the_right_one_is_loaded(tmp_path):
     own = tmp_path / "robot.yaml"
 
     def write(name):
@@ -273,7 +278,7 @@ def test_a_reduced_frame_holds_what_is_near():
 def followed(stages, sweeps):
     """Trust after the last of some sweeps in a row, a comparison with the profile being awaited."""
     for frame in sweeps:
-        trust = stages.step(frame, UNLIMITED, reduced=False).trust
+        trust = step(stages, frame).trust
         stages.adapt(frame)
         if stages.comparison is not None:
             stages.comparison.join()
@@ -290,7 +295,7 @@ def of_drive(sensor, first, n):
 
 
 @pytest.mark.slow
-def test_compare_profiles_is_noticed_and_followed_and_the_first_one_is_believed_again():
+def test_another_sensor_is_noticed_and_followed_and_the_first_one_is_believed_again():
     stages = stages_of(profile=None)
     before, *_ = of_drive("hdl-64e", 0, 1)
     stages.choose_profile(before)
@@ -328,10 +333,7 @@ def test_an_exchange_that_was_the_effect_of_a_fault_is_taken_back_without_anothe
     """The fault began and ended while nothing was seen, so no reason changes when it ends."""
     stages, first = with_exchanged_profile()
     for time_s, found in ((1.9, ["profile"]), (2.0, []), (9.0, [])):
-        stages.adapt(dataclasses.replace(first, stamp_s=time_s, steady_s=time_s))
-        if stages.comparison is not None:
-            stages.comparison.join()
-        stages.adapt(dataclasses.replace(first, stamp_s=time_s, steady_s=time_s))
+        awaited(stages, dataclasses.replace(first, stamp_s=time_s, steady_s=time_s))
         assert list(stages._findings()) == found
     assert stages.misfits == 2
 
@@ -399,5 +401,5 @@ def test_a_dead_beam_is_left_out_while_the_sweeps_are_level(tilt_deg, monkeypatc
     level = lambda frame: dataclasses.replace(frame, R_level_sensor=R_level_sensor)  # noqa: E731
     monkeypatch.setattr(stages.pipeline.view.leveller, "level", level)
     for frame in frames()[:2]:
-        stages.step(frame, UNLIMITED, reduced=False)
+        step(stages, frame)
     assert told == 2 * [() if tilt_deg else (1.0,)]

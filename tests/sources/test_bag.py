@@ -22,12 +22,17 @@ def write(request):
     return request.param
 
 
+@pytest.fixture
+def opened(write, tmp_path):
+    return lambda recorded: open_stream(write(tmp_path / "drive", recorded))
+
+
 def x_of(frames):
     return [frame.T_world_sensor[0, 3] for frame in frames]
 
 
-def test_sweeps_are_frames_and_stamps_count_from_the_first(write, tmp_path):
-    stream = open_stream(write(tmp_path / "drive", by_time(clouds(), poses())))
+def test_sweeps_are_frames_and_stamps_count_from_the_first(opened):
+    stream = opened(by_time(clouds(), poses()))
     assert (stream.info.name, stream.info.layout, stream.info.n_frames) == ("drive", "rosbag2", 4)
     assert stream.info.period_s == pytest.approx(0.1, abs=1e-6)
     frames = list(stream)
@@ -40,11 +45,11 @@ def test_sweeps_are_frames_and_stamps_count_from_the_first(write, tmp_path):
     assert x_of(frames) == pytest.approx([10.0, 10.1, 10.2, 10.3], abs=1e-6)
 
 
-def test_the_mount_of_the_sensor_is_taken_from_the_static_transforms(write, tmp_path):
+def test_the_mount_of_the_sensor_is_taken_from_the_static_transforms(opened):
     turned = [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]
     mount = messages.encode(messages.transforms(("base_link", "lidar", [1.0, 0.0, 2.0], turned)))
     recorded = by_time(clouds(), poses("base_link"), [("/tf_static", TF, BEGAN_S - 1, mount)])
-    first = next(iter(open_stream(write(tmp_path / "drive", recorded))))
+    first = next(iter(opened(recorded)))
     np.testing.assert_allclose(first.T_world_sensor[:3, 3], [11.0, 0.0, 2.0], atol=1e-6)
     np.testing.assert_allclose(first.T_world_sensor[:3, 0], [0.0, 1.0, 0.0], atol=1e-6)
 
@@ -57,8 +62,8 @@ def test_the_mount_of_the_sensor_is_taken_from_the_static_transforms(write, tmp_
         (by_time(poses(), poses(topic="/wheels")), "several topics of odometry (/odom, /wheels)"),
     ],
 )
-def test_poses_that_cannot_be_used_are_left_out_and_named(write, tmp_path, others, note):
-    stream = open_stream(write(tmp_path / "drive", by_time(clouds(), others)))
+def test_poses_that_cannot_be_used_are_left_out_and_named(opened, others, note):
+    stream = opened(by_time(clouds(), others))
     assert not stream.info.has_poses
     assert note in " ".join(stream.info.pose_notes)
     assert [frame.T_world_sensor for frame in stream] == [None] * 4
@@ -84,39 +89,39 @@ def test_one_of_several_topics_is_to_be_chosen_and_what_is_there_is_named(write,
         open_stream(write(tmp_path / "poses", poses()))
 
 
-def test_a_message_that_cannot_be_used_is_counted_and_skipped(write, tmp_path, caplog):
+def test_a_message_that_cannot_be_used_is_counted_and_skipped(opened, caplog):
     recorded = clouds()
     recorded[1] = (*recorded[1][:3], b"\0\1\0\0\1\2")
     recorded[2] = (*recorded[2][:3], recorded[0][3])  # stamped as the first one
     recorded[3] = (*recorded[3][:3], messages.encode(messages.cloud(messages.xyzi(9), stamp_s=BEGAN_S - 5)))
-    stream = open_stream(write(tmp_path / "drive", recorded))
+    stream = opened(recorded)
     assert [frame.index for frame in stream] == [0, 2]
     assert stream.faults.skipped == 2
     assert "/points: frame 1: 6 bytes end within a field; frame skipped" in caplog.text
     assert "/points: frame 3: stamped 5.000 s before the last sweep; frame skipped" in caplog.text
 
 
-def test_a_driver_without_stamps_is_stamped_by_the_recording(write, tmp_path):
+def test_a_driver_without_stamps_is_stamped_by_the_recording(opened):
     raw = messages.encode(messages.cloud(messages.xyzi(20), stamp_s=0.0))
     recorded = [("/points", CLOUD, BEGAN_S + k / 10, raw) for k in range(3)]
-    stream = open_stream(write(tmp_path / "drive", recorded))
+    stream = opened(recorded)
     assert [frame.stamp_s for frame in stream] == pytest.approx([0.0, 0.1, 0.2], abs=1e-6)
 
 
 @pytest.mark.parametrize("unit_s", [0.0, 1e-3, 1e3])
-def test_stamps_that_stand_still_are_replaced_by_the_times_of_the_recording(write, tmp_path, unit_s):
+def test_stamps_that_stand_still_are_replaced_by_the_times_of_the_recording(opened, unit_s):
     recorded = []
     for k in range(6):
         cloud = messages.cloud(messages.xyzi(20), stamp_s=1000.0 + k / 10 * unit_s)
         recorded.append(("/points", CLOUD, BEGAN_S + k / 10, messages.encode(cloud)))
-    stream = open_stream(write(tmp_path / "drive", recorded))
+    stream = opened(recorded)
     assert [frame.stamp_s for frame in stream] == pytest.approx([k / 10 for k in range(6)], abs=1e-6)
     assert "the stamps of the sweeps stand still" in stream.info.notes[0]
 
 
-def test_a_sweep_that_is_recorded_twice_is_read_once(write, tmp_path):
+def test_a_sweep_that_is_recorded_twice_is_read_once(opened):
     twice = by_time(clouds(6), [(topic, kind, s + 1e-3, data) for topic, kind, s, data in clouds(6)])
-    stream = open_stream(write(tmp_path / "drive", twice))
+    stream = opened(twice)
     assert [frame.stamp_s for frame in stream] == pytest.approx([k / 10 for k in range(6)], abs=1e-6)
     assert stream.faults.left_out == {"has the stamp of the last sweep: recorded twice?": 6}
 
@@ -143,32 +148,32 @@ def test_one_of_two_sensors_in_a_topic_is_read_and_the_other_counted(write, tmp_
 
 
 @pytest.mark.parametrize(("frame_id", "note"), [("camera_init", "record what"), ("eye_optical_frame", "of a camera")])
-def test_points_that_are_not_in_the_axes_of_a_sensor_are_noted(write, tmp_path, frame_id, note):
+def test_points_that_are_not_in_the_axes_of_a_sensor_are_noted(opened, frame_id, note):
     raw = [messages.encode(messages.cloud(messages.xyzi(20), stamp_s=BEGAN_S + k, frame_id=frame_id)) for k in (0, 1)]
-    stream = open_stream(write(tmp_path / "drive", [("/points", CLOUD, BEGAN_S + k, raw[k]) for k in (0, 1)]))
+    stream = opened([("/points", CLOUD, BEGAN_S + k, raw[k]) for k in (0, 1)])
     assert note in stream.info.notes[0]
 
 
 @pytest.mark.parametrize("lying", [lambda k, s: s + 3600 * (k == 3), lambda k, s: s + 3600 * (k == 0)])
-def test_a_lying_stamp_of_a_pose_costs_no_other_pose(write, tmp_path, lying):
+def test_a_lying_stamp_of_a_pose_costs_no_other_pose(opened, lying):
     recorded = []
     for k, (topic, kind, recorded_s, _) in enumerate(poses()):
         true_s = recorded_s - 0.001
         message = messages.odometry(lying(k, true_s), [10.0 + true_s - BEGAN_S, 0.0, 0.0], UP, "lidar")
         recorded.append((topic, kind, recorded_s, messages.encode(message)))
-    frames = list(open_stream(write(tmp_path / "drive", by_time(clouds(), recorded))))
+    frames = list(opened(by_time(clouds(), recorded)))
     assert x_of(frames) == pytest.approx([10.0, 10.1, 10.2, 10.3], abs=1e-5)
 
 
-def test_poses_that_a_localisation_gives_seconds_later_are_those_of_their_stamps(write, tmp_path):
+def test_poses_that_a_localisation_gives_seconds_later_are_those_of_their_stamps(opened):
     late = [(topic, kind, recorded_s + 1.5, data) for topic, kind, recorded_s, data in poses()]
-    stream = open_stream(write(tmp_path / "drive", by_time(clouds(), late)))
+    stream = opened(by_time(clouds(), late))
     assert x_of(stream) == pytest.approx([10.0, 10.1, 10.2, 10.3], abs=1e-5)
     assert stream.reading.without_pose == 0
 
 
-def test_frames_without_a_pose_are_counted(write, tmp_path):
-    stream = open_stream(write(tmp_path / "drive", by_time(clouds(12), poses()[:20])))
+def test_frames_without_a_pose_are_counted(opened):
+    stream = opened(by_time(clouds(12), poses()[:20]))
     frames = list(stream)
     assert [frame.T_world_sensor is None for frame in frames] == [False] * 5 + [True] * 7
     assert stream.reading.without_pose == 7
@@ -186,15 +191,15 @@ def test_what_is_recorded_after_the_clock_was_set_back_comes_later(tmp_path, opt
     assert not stream.faults.count
 
 
-def test_topics_that_a_converter_wrote_one_after_the_other_are_merged(write, tmp_path):
-    stream = open_stream(write(tmp_path / "drive", [*clouds(), *poses()]))
+def test_topics_that_a_converter_wrote_one_after_the_other_are_merged(opened):
+    stream = opened([*clouds(), *poses()])
     assert x_of(stream) == pytest.approx([10.0, 10.1, 10.2, 10.3], abs=1e-5)
 
 
-def test_a_wrong_stamp_of_the_first_sweep_costs_it_alone(write, tmp_path):
+def test_a_wrong_stamp_of_the_first_sweep_costs_it_alone(opened):
     late = messages.encode(messages.cloud(messages.xyzi(20), stamp_s=BEGAN_S + 3600))
     recorded = by_time([(*clouds()[0][:3], late)], clouds()[1:], poses())
-    frames = list(open_stream(write(tmp_path / "drive", recorded)))
+    frames = list(opened(recorded))
     assert [frame.index for frame in frames] == [1, 2, 3]
     assert x_of(frames) == pytest.approx([10.1, 10.2, 10.3], abs=1e-5)
 
@@ -226,8 +231,8 @@ def test_a_recording_in_several_files_is_read_in_their_order(tmp_path):
     assert len(list(open_stream(tmp_path))) >= 12
 
 
-def test_a_recording_may_be_read_by_another_thread_than_began(write, tmp_path):
-    frames = iter(open_stream(write(tmp_path / "drive", by_time(clouds(), poses()))))
+def test_a_recording_may_be_read_by_another_thread_than_began(opened):
+    frames = iter(opened(by_time(clouds(), poses())))
     rest = [next(frames)]
     reader = threading.Thread(target=lambda: rest.extend(frames))
     reader.start()
@@ -316,8 +321,8 @@ def static(topic):
         moving(NAMESPACE + "/tf", with_mount=True),
     ],
 )
-def test_poses_come_from_any_namespace_and_from_transforms(write, tmp_path, others):
-    stream = open_stream(write(tmp_path / "drive", by_time(clouds(), others)))
+def test_poses_come_from_any_namespace_and_from_transforms(opened, others):
+    stream = opened(by_time(clouds(), others))
     assert stream.info.has_poses
     assert x_of(stream) == pytest.approx([11.0, 11.1, 11.2, 11.3], abs=1e-5)
 
@@ -325,23 +330,23 @@ def test_poses_come_from_any_namespace_and_from_transforms(write, tmp_path, othe
 @pytest.mark.parametrize(
     ("namespace", "posed"), [({"lidar": "robot/lidar"}, True), ({"lidar": "a/lidar", "x": "b/lidar"}, False)]
 )
-def test_the_frame_of_the_points_may_lack_the_namespace_of_the_transforms(write, tmp_path, namespace, posed):
+def test_the_frame_of_the_points_may_lack_the_namespace_of_the_transforms(opened, namespace, posed):
     edges = [("base_link", name, [1.0, 0.0, 2.0], UP) for name in namespace.values()]
     mount = [("/tf_static", TF, BEGAN_S - 1, messages.encode(messages.transforms(*edges)))]
-    stream = open_stream(write(tmp_path / "drive", by_time(clouds(), poses("base_link"), mount)))
+    stream = opened(by_time(clouds(), poses("base_link"), mount))
     assert stream.info.has_poses == posed
     assert not posed or x_of(stream) == pytest.approx([11.0, 11.1, 11.2, 11.3], abs=1e-5)
 
 
 @pytest.mark.parametrize("package", ["livox_ros_driver2", "livox_ros_driver"])
-def test_messages_of_livox_own_type_are_read_with_the_times_of_their_points(write, tmp_path, package):
+def test_messages_of_livox_own_type_are_read_with_the_times_of_their_points(opened, package):
     rng = np.random.default_rng(0)
     xyz = rng.uniform(-20, 20, (500, 3)).astype(np.float32)
     recorded = [
         ("/livox/lidar", f"{package}/msg/CustomMsg", BEGAN_S + k / 10, messages.livox(BEGAN_S + k / 10, xyz, package))
         for k in range(5)
     ]
-    frames = [*open_stream(write(tmp_path / "drive", by_time(recorded, poses("livox_frame"))))]
+    frames = [*opened(by_time(recorded, poses("livox_frame")))]
     assert len(frames) == 5
     np.testing.assert_allclose(frames[1].points[:, 1:3], xyz[:, 1:], atol=1e-6)
     since_middle_s = np.linspace(-0.05, 0.05, 500, endpoint=False)
@@ -381,7 +386,7 @@ def test_an_option_chooses_one_of_several_topics_of_poses(write, tmp_path):
 
 
 @pytest.mark.parametrize(("apart", "lost"), [(1, 0), (4, 1)])
-def test_parts_of_turns_that_are_recorded_out_of_order_are_joined_in_theirs(write, tmp_path, apart, lost):
+def test_parts_of_turns_that_are_recorded_out_of_order_are_joined_in_theirs(opened, apart, lost):
     """Those that come much later are counted."""
     bearing = np.linspace(np.pi, -np.pi, 3000, endpoint=False)
     layout = [(axis, "f4") for axis in "xyz"]
@@ -393,7 +398,7 @@ def test_parts_of_turns_that_are_recorded_out_of_order_are_joined_in_theirs(writ
         stamp_s = BEGAN_S + k / 30
         cloud = messages.encode(messages.cloud(points, stamp_s=stamp_s))
         recorded.append(("/points", CLOUD, stamp_s + 0.03 + (apart + 0.5) / 30 * (k == 20), cloud))
-    stream = open_stream(write(tmp_path / "drive", by_time(recorded)))
+    stream = opened(by_time(recorded))
     frames = [*stream]
     assert len(frames) == 12
     assert sum(len(frame.points) for frame in frames) == pytest.approx(36_000 - 1000 * lost, abs=5)

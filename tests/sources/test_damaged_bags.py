@@ -22,6 +22,18 @@ def read(path):
     return stream, [frame.index for frame in stream]
 
 
+def assert_whole(path):
+    stream, frames = read(path)
+    assert frames == list(range(N))
+    assert not stream.faults.count
+
+
+def write_split(folder, n_files, name="drive"):
+    """The sweeps in several files, NAME_0.mcap and so on."""
+    each = N // n_files
+    return [write_mcap(folder / f"{name}_{k}", clouds(N)[each * k :][:each]) for k in range(n_files)]
+
+
 def killed(folder, recorded, *pragmas, commit_every=2):
     """A database whose recorder ended without closing it, so that what it wrote last lies beside it."""
     folder.mkdir()
@@ -56,9 +68,7 @@ def test_what_a_killed_recorder_left_in_its_log_is_read(tmp_path, as_folder):
     folder, path = killed(tmp_path / "drive", clouds(N), "PRAGMA journal_mode=WAL", "PRAGMA wal_autocheckpoint=0")
     before = path.read_bytes()
     assert path.with_name("drive_0.db3-wal").stat().st_size
-    stream, frames = read(folder if as_folder else path)
-    assert frames == list(range(N))
-    assert not stream.faults.count
+    assert_whole(folder if as_folder else path)
     assert path.read_bytes() == before
 
 
@@ -116,15 +126,13 @@ def test_a_file_that_ends_within_the_head_of_a_record_is_not_whole(tmp_path, lef
 
 
 def test_a_bad_file_of_a_split_recording_costs_no_other(tmp_path, caplog):
-    recorded = clouds(N)
-    for k in range(3):
-        write_mcap(tmp_path / f"drive_{k}", recorded[4 * k : 4 * k + 4])
-    (tmp_path / "drive_1.mcap").write_bytes(b"garbage" * 100)
+    first, second, third = write_split(tmp_path, 3)
+    second.write_bytes(b"garbage" * 100)
     stream, frames = read(tmp_path)
     assert len(frames) == 8
     assert any("drive_1.mcap" in reason for reason in stream.faults.left_out)
-    (tmp_path / "drive_0.mcap").write_bytes(b"")
-    (tmp_path / "drive_2.mcap").write_bytes(b"")
+    first.write_bytes(b"")
+    third.write_bytes(b"")
     with pytest.raises(ModtError):
         open_stream(tmp_path)
 
@@ -142,13 +150,10 @@ def test_a_lost_file_of_a_split_recording_is_counted_by_its_metadata(tmp_path):
 def test_a_file_that_the_metadata_list_twice_and_out_of_order_is_read_once_in_its_place(tmp_path):
     folder = tmp_path / "drive"
     folder.mkdir()
-    for k in range(3):
-        write_mcap(folder / f"drive_{k}", clouds(N)[4 * k : 4 * k + 4])
+    write_split(folder, 3)
     listed = "\n".join(f"    - drive_{k}.mcap" for k in (2, 0, 1, 0))
     (folder / "metadata.yaml").write_text(f"rosbag2_bagfile_information:\n  relative_file_paths:\n{listed}\n")
-    stream, frames = read(folder)
-    assert frames == list(range(N))
-    assert not stream.faults.count
+    assert_whole(folder)
 
 
 def pages_of(raw):
@@ -189,8 +194,7 @@ def test_a_damaged_database_gives_all_rows_that_its_pages_hold(tmp_path, what):
 
 
 def test_a_file_that_is_missing_by_the_numbers_of_the_others_is_named(tmp_path):
-    for k in (0, 1, 3):
-        write_mcap(tmp_path / f"drive_{k}", clouds(N)[3 * k : 3 * k + 3])
+    write_split(tmp_path, 4)[2].unlink()
     stream, frames = read(tmp_path)
     assert len(frames) == 9
     assert stream.faults.left_out == {"file number 2 is not there": 1}
@@ -201,9 +205,7 @@ def test_a_damaged_summary_loses_nothing(tmp_path):
     raw = bytearray(path.read_bytes())
     raw[-60:] = b"\xaa" * 60
     path.write_bytes(raw)
-    stream, frames = read(path)
-    assert frames == list(range(N))
-    assert not stream.faults.count
+    assert_whole(path)
 
 
 def test_a_chunk_is_read_whose_index_of_one_topic_is_damaged(tmp_path):
@@ -237,10 +239,7 @@ def test_a_topic_that_a_database_lists_twice_is_one(tmp_path):
 
 @pytest.mark.parametrize("listed", [True, False])
 def test_a_file_whose_compression_was_not_finished_is_read_once(tmp_path, listed):
-    recorded = clouds(N)
-    for k in range(3):
-        write_mcap(tmp_path / f"drive_{k}", recorded[4 * k : 4 * k + 4])
-    first, second, third = (tmp_path / f"drive_{k}.mcap" for k in range(3))
+    first, second, third = write_split(tmp_path, 3)
     packed = {file: ZstdCompressor().compress(file.read_bytes()) for file in (first, second)}
     first.with_name("drive_0.mcap.zstd").write_bytes(packed[first])
     first.unlink()
@@ -248,35 +247,27 @@ def test_a_file_whose_compression_was_not_finished_is_read_once(tmp_path, listed
     if listed:
         names = "".join(f"  - {name}\n" for name in ("drive_0.mcap.zstd", "drive_1.mcap.zstd", third.name))
         (tmp_path / "metadata.yaml").write_text(f"rosbag2_bagfile_information:\n  relative_file_paths:\n{names}")
-    stream, frames = read(tmp_path)
-    assert frames == list(range(N))
-    assert not stream.faults.count
+    assert_whole(tmp_path)
 
 
 def test_a_recording_that_was_renamed_is_whole(tmp_path):
-    for k in range(2):
-        write_mcap(tmp_path / f"walk_{k}", clouds(N)[6 * k : 6 * k + 6])
+    write_split(tmp_path, 2, "walk")
     (tmp_path / "metadata.yaml").write_text(
         "rosbag2_bagfile_information:\n  relative_file_paths: [old/drive_0.mcap, old/drive_1.mcap]\n"
     )
-    stream, frames = read(tmp_path)
-    assert frames == list(range(N))
-    assert not stream.faults.count
+    assert_whole(tmp_path)
 
 
 @pytest.mark.parametrize("listed", [True, False])
 def test_files_beside_a_recording_are_no_part_of_it(tmp_path, listed):
-    for k in range(2):
-        write_mcap(tmp_path / f"drive_{k}", clouds(N)[6 * k : 6 * k + 6])
-        (tmp_path / f"._drive_{k}.mcap").write_bytes(b"copied by another system")
+    for file in write_split(tmp_path, 2):
+        file.with_name(f"._{file.name}").write_bytes(b"copied by another system")
     if listed:
         write_mcap(tmp_path / "results", clouds(N, "/modt/points"))
         (tmp_path / "metadata.yaml").write_text(
             "rosbag2_bagfile_information:\n  relative_file_paths: [drive_0.mcap, drive_1.mcap]\n"
         )
-    stream, frames = read(tmp_path)
-    assert frames == list(range(N))
-    assert not stream.faults.count
+    assert_whole(tmp_path)
 
 
 def test_an_empty_file_is_named(tmp_path):
