@@ -19,6 +19,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from modt.native import build
+from tools.deps import UV
 from tools.options import parser
 
 if sys.version_info >= (3, 11):
@@ -100,9 +101,8 @@ def install(root: Path) -> None:
     wanted = [
         name for name in wanted if name.split(">")[0] not in LEFT_OUT and not name.startswith(("types-", "scipy-"))
     ]
-    uv = shutil.which("uv") or Path(sys.executable).with_name("uv")
     form = ["--only-binary", ":all:", "--python-platform", PLATFORM, "--python-version", PYTHON]
-    run(uv, "--no-config", "pip", "install", "--quiet", *form, "--target", root / LIBRARIES, *wanted)
+    run(UV, "--no-config", "pip", "install", "--quiet", *form, "--target", root / LIBRARIES, *wanted)
 
 
 def compile_kernels(folder: Path) -> Path:

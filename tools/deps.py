@@ -32,11 +32,11 @@ FAST = "not slow and not install and not kitti"
 OLDEST = "lowest-direct"
 NEWEST = "highest"
 EPOCH = "1700000000"
+UV = shutil.which("uv") or str(Path(sys.executable).with_name("uv"))
 
 
 def _uv(*arguments: object, check: bool = True) -> subprocess.CompletedProcess[str]:
-    program = shutil.which("uv") or str(Path(sys.executable).with_name("uv"))
-    command = [program, "--no-config", *map(str, arguments)]
+    command = [UV, "--no-config", *map(str, arguments)]
     try:
         return subprocess.run(command, check=check, text=True, stdout=subprocess.PIPE, cwd=ROOT)
     except FileNotFoundError:

@@ -6,16 +6,15 @@ service, and removing the package removes it. Needs dpkg-deb, uv and a package i
 
 from __future__ import annotations
 
-import shutil
 import subprocess
-import sys
 import tempfile
 import zipfile
 from pathlib import Path
 
+from tools.deps import EXTRAS, UV
+
 ARCHITECTURES = {"x86_64": "amd64", "aarch64": "arm64"}
 """Debian's name of each machine."""
-EXTRAS = ("velodyne", "ros2", "foxglove")
 PLACE = "opt/modt"
 PROGRAM = """#!/usr/bin/python{python}
 import sys
@@ -67,10 +66,9 @@ def _unpack(wheel: Path, place: Path, architecture: str, python: str, *, librari
             file.extractall(place)
         return
     machine = next(machine for machine, name in ARCHITECTURES.items() if name == architecture)
-    uv = shutil.which("uv") or str(Path(sys.executable).with_name("uv"))
     form = ["--only-binary", ":all:", "--python-platform", f"{machine}-manylinux_2_28", "--python-version", python]
     wanted = f"modt[{','.join(EXTRAS)}] @ {wheel.resolve().as_uri()}"
-    command = [uv, "--no-config", "pip", "install", "--quiet", *form, "--target", str(place), wanted]
+    command = [UV, "--no-config", "pip", "install", "--quiet", *form, "--target", str(place), wanted]
     try:
         subprocess.run(command, check=True)
     except FileNotFoundError:
