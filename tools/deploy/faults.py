@@ -56,28 +56,26 @@ class World:
         disk_full, meter_lost, stage_broken: the fault is active.
     """
 
-    def __init__(self, core: int | None, hogs: int, *, fifo: bool) -> None:
+    def __init__(self, core: int | None, *, fifo: bool) -> None:
         self.disk_full = False
         self.meter_lost = False
         self.stage_broken = False
         self._core = core
-        self._n_hogs = hogs
         self._fifo = fifo
-        self._hogs: list[subprocess.Popen[bytes]] = []
+        self._hog: subprocess.Popen[bytes] | None = None
 
-    def set_hogs(self, on: bool) -> None:
-        """Begin or end processes that compute on the core of the loop."""
-        while on and len(self._hogs) < self._n_hogs:
-            hog = subprocess.Popen([sys.executable, "-c", HOG])
+    def set_hog(self, on: bool) -> None:
+        """Begin or end a process that computes on the core of the loop."""
+        if on and self._hog is None:
+            self._hog = subprocess.Popen([sys.executable, "-c", HOG])
             if self._fifo:
-                os.sched_setscheduler(hog.pid, os.SCHED_FIFO, os.sched_param(HOG_PRIORITY))
+                os.sched_setscheduler(self._hog.pid, os.SCHED_FIFO, os.sched_param(HOG_PRIORITY))
             if self._core is not None:
-                os.sched_setaffinity(hog.pid, {self._core})
-            self._hogs.append(hog)
-        while not on and self._hogs:
-            hog = self._hogs.pop()
-            hog.kill()
-            hog.wait()
+                os.sched_setaffinity(self._hog.pid, {self._core})
+        if not on and self._hog is not None:
+            self._hog.kill()
+            self._hog.wait()
+            self._hog = None
 
     def install(self) -> None:
         """Put the switches of disk and stages into this process."""
@@ -226,6 +224,6 @@ FAULTS = (
     Fault(FULL_DISK, 3.0, lambda s: s.recording.health().lost_lines, switch=_switch("disk_full")),
     Fault("meter lost", 3.0, lambda s: s.power.unread_windows, switch=_switch("meter_lost")),
     Fault("failing stage", 1.0, lambda s: s.failures.counts.total(), switch=_switch("stage_broken")),
-    Fault("hog", 4.0, _late_frames, switch=World.set_hogs, silent_if_steady=True),
+    Fault("hog", 4.0, _late_frames, switch=World.set_hog, silent_if_steady=True),
     Fault("reload", 0.2, lambda s: s.reloads, switch=_hangup),
 )

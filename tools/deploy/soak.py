@@ -9,7 +9,7 @@ takes the core ("hog") needs to be counted only if results stall. A second after
 quality again, and 5 s after one of the scene they are trusted. Records are lost only on a full disk. At most one
 deadline in 1,000 is missed between faults. Memory and open descriptors stay flat.
 
-`--fifo` runs at the real-time priority of a service; hogs get a higher one.
+`--fifo` runs at the real-time priority of a service; the hog gets a higher one.
 """
 
 from __future__ import annotations
@@ -254,7 +254,6 @@ def main(arguments: list[str] | None = None) -> int:
     options.add_argument("drive", type=Path, nargs="?", help="a recording (default: a synthetic one)")
     options.add_argument("--minutes", type=float, default=5.0)
     options.add_argument("--seed", type=int, default=1)
-    options.add_argument("--hogs", type=int, default=1, help="processes on the loop's core (default: %(default)s)")
     options.add_argument("--profile", help="default: as modt run")
     options.add_argument("--out", type=Path, default=Path("runs/soak"))
     options.add_argument("--fifo", action="store_true", help="with the priority of a service")
@@ -274,7 +273,7 @@ def soak(given: argparse.Namespace) -> list[str]:
     host.pin_to_core(core)
     if given.fifo:
         host.take_real_time_priority()
-    world = World(core, given.hogs, fifo=given.fifo)
+    world = World(core, fifo=given.fifo)
     world.install()
     build.discover = lambda board: world.meters(time.monotonic)  # type: ignore[attr-defined,assignment,misc]
     log = ResultLog()
@@ -290,7 +289,7 @@ def soak(given: argparse.Namespace) -> list[str]:
     try:
         service.run(Notifier())
     finally:
-        world.set_hogs(False)
+        world.set_hog(False)
         sender.kill()
         sender.wait()
     reader.ask()

@@ -43,9 +43,7 @@ class Drive:
 def simulated(scene: str, sensor: str, seconds: float, seed: int, **conditions: Any) -> Drive:
     """A simulated drive, labelled all round; `conditions` are those of SyntheticStream."""
     stream = SyntheticStream(scene, sensor, seconds, seed, **conditions)
-    frames = []
-    for frame, truth in stream.sweeps():
-        frames.append((frame, simulated_truth(truth)))
+    frames = [(frame, simulated_truth(truth)) for frame, truth in stream.sweeps()]
     return Drive(stream.info.name, load(sensor), frames)
 
 
