@@ -101,7 +101,8 @@ class RecordedRun:
     def first_object(self) -> int:
         """Index of the first frame in which an object is reported; 0 where none is."""
         at, class_ = (self.tracks[:, COLUMNS.index(name)] for name in ("at", "class"))
-        return int(at[class_ > 0].min(initial=len(self.frames))) % len(self.frames)
+        none = len(self.frames)
+        return int(at[class_ > 0].min(initial=none)) % none
 
     @property
     def budget(self) -> str:

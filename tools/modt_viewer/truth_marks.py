@@ -69,6 +69,7 @@ def _objects(truth: FrameTruth, rows: Rows) -> list[dict[str, Any]]:
 
 def points_in_boxes(record: dict[str, Any], points: Float32) -> Int:
     """(N,) proposal of each point, by the boxes of a record, NONE where it lies in none."""
+    # Sorted along x, so that only the points of a strip are compared with each box.
     order = np.argsort(points[:, 0], kind="stable")
     sorted_x = points[order, 0]
     found = np.full(len(points), NONE, np.int64)

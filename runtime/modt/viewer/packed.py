@@ -81,13 +81,15 @@ class Cells:
 
     def thinned(self, most: int) -> Cells:
         """Cells, `most` of them at most. Cells of the ground are left out first."""
-        kept = [np.flatnonzero(self.level > 0), np.flatnonzero(self.level == 0)]
-        for group, rows in enumerate(kept):
-            room = max(most - (len(kept[0]) if group else 0), 0)
-            if len(rows) > room:
-                kept[group] = rows[np.linspace(0, len(rows), room, endpoint=False).astype(np.int64)]
-        rows = np.sort(np.concatenate(kept))
+        above = _spread(np.flatnonzero(self.level > 0), most)
+        ground = _spread(np.flatnonzero(self.level == 0), most - len(above))
+        rows = np.sort(np.concatenate([above, ground]))
         return Cells(self.cell[rows], self.level[rows], self.group[rows])
+
+
+def _spread(rows: Int, most: int) -> Int:
+    """Rows, `most` of them at most, evenly spread."""
+    return rows if len(rows) <= most else rows[np.linspace(0, len(rows), most, endpoint=False).astype(np.int64)]
 
 
 def occupied(x: Float32, y: Float32, level: Int, group: Int, step_cm: int) -> Cells:
