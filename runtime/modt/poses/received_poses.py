@@ -71,6 +71,7 @@ class PoseSequence:
         doubt = self._doubted.doubt(stamp_s, T, now_s)
         if doubt not in (None, "repeated"):
             self._vote_against()
+            # That vote may have ended the doubted sequence; then this pose begins the next one.
             doubt = self._doubted.doubt(stamp_s, T, now_s)
         if doubt is None:
             self._doubted.add(stamp_s, T)

@@ -230,6 +230,7 @@ def _points(table: NDArray[Any], fields: Mapping[str, Any]) -> Float32:
     rows = points.reshape(*table.shape, 4)
     kind, offset = xyz[0]
     with np.errstate(all="ignore"):  # float64 beyond float32, and NaN
+        # Where all four lie one behind the other in one type, as most drivers write them, they are copied at once.
         if [*xyz, reflectance and fields[reflectance]] == [(kind, offset + k * kind.itemsize) for k in range(4)]:
             rows[...] = as_strided(table["x"], rows.shape, (*table.strides, kind.itemsize))
         else:
@@ -302,13 +303,14 @@ def turn_of(points: Float32, times: NDArray[np.generic]) -> Turn | str:
     early, middle, late = np.quantile(t[used], (0.02, 0.5, 0.98))
     if early == late:
         return COMPENSATED
-    used &= np.abs(t - middle) <= late - early
+    used &= np.abs(t - middle) <= late - early  # without wild times
     unit_s = next((unit for unit in UNITS_S if SPANS_S[0] <= np.ptp(t[used]) * unit <= SPANS_S[1]), None)
     if unit_s is None:
         return "their points' times span no sweep"
     begin = t[used].min()
     since_s = (t[used] - begin) * unit_s
     bearing = np.arctan2(y[used], x[used])
+    # The head turns one way or the other: the one whose line of time over angle fits better.
     turn = min((_fitted(bearing, since_s, way) for way in (1.0, -1.0)), key=lambda fit: fit[1])[0]
     began_s = float(begin * unit_s)
     if turn is None:

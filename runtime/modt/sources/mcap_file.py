@@ -340,6 +340,7 @@ def _scanned(view: View) -> Contents:
             if not ended:  # behind the end of the data there is but a summary
                 contents.gaps.append(at)
                 _end_index(contents.pieces)
+            # A message has no checksum: its length may be what is damaged, and records lie within what it claimed.
             end = _next_begin(view, before + 1 if view[before] == MESSAGE else at + 1)
         else:
             before = at
@@ -469,7 +470,7 @@ def _record_kinds() -> dict[int, Any]:
         3: records.Schema,
         4: records.Channel,
         MESSAGE: records.Message,
-        7: records.MessageIndex,
+        MESSAGE_INDEX: records.MessageIndex,
         8: records.ChunkIndex,
         11: records.Statistics,
     }

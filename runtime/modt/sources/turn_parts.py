@@ -149,8 +149,9 @@ class TurnParts:
         last_s, last_phase = max(self._marks)
         since_turns = (time_s - last_s) / abs(self.turn_s)
         reached = last_phase + 2 * np.pi * since_turns  # phase that the head has reached by the stamp
-        if since_turns < 0:
+        if since_turns < 0:  # late, maybe by turns: the phase nearest to the one at which the head was
             return float(phase - 2 * np.pi * np.rint((phase - reached) / (2 * np.pi))), False
+        # Arrivals tell less than stamps: by them, only a long gap ends a turn.
         passed = reached > MAX_PHASE if cloud.began_s else since_turns > MAX_GAP_TURNS
         return phase, passed or phase < last_phase - MARGIN_RAD
 

@@ -290,6 +290,7 @@ class TurnDecoder(PacketDecoder):
         last = self._last
         gap_s = 0.0 if last is None else entry.time_s - last.time_s
         if last is None or max(abs(gap_s), entry.time_s - self._turn.began_s) > self._longest_s:
+            # The sensor was off, or its clock was set: only a short gap is one of lost packets.
             if self._interval_s and 0 < gap_s < SILENCE_S:
                 self.reception.lost += max(round(gap_s / self._interval_s) - 1, 0)
             return self._wait_for_cut(entry)
@@ -345,6 +346,7 @@ class TurnDecoder(PacketDecoder):
 
     def _points(self, entries: Sequence[Entry]) -> Float32:
         """Table of a turn, without the points that its first and last packets have beyond the seam."""
+        # Clockwise from behind the sensor, a turn begins on its left (y > 0) and ends on its right (y < 0).
         begin = self._reach
         end = TURN - self._reach
         tables = []
