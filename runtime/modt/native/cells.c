@@ -217,37 +217,95 @@ EXPORT void modt_mean_solidity(const i64 *entries, const float *solidity, const 
         mean[k] = count[k] > 0.0 ? mean[k] / count[k] : 1.0;
 }
 
-/* PorosityFinder.airborne_points: whether each point is airborne. `rows` are the points in the order of their
- * cells, from `offsets` on. Scratch: `place`, (n,), and `height_of_row`, of all points. */
+/* Sorts the points of the `wanted` of n cells by cell: the rows of cell c, and their heights, are those from first[c]
+ * to before first[c + 1]. */
+static void sort_points(const uint8_t *wanted, i32 n, const i64 *cell_of_point, const float *height, i64 n_points,
+                        i32 *first, i32 *rows, float *height_of_row)
+{
+    for (i32 c = 0; c <= n; c++)
+        first[c] = 0;
+    for (i64 i = 0; i < n_points; i++) {
+        PROVEN(cell_of_point[i] >= 0 && cell_of_point[i] < n);
+        first[cell_of_point[i]] += wanted[cell_of_point[i]];
+    }
+    for (i32 c = 1; c <= n; c++)
+        first[c] += first[c - 1]; /* where the next cell begins, until all its points are placed, the last one first */
+    for (i64 i = n_points - 1; i >= 0; i--) {
+        i64 c = cell_of_point[i];
+        if (!wanted[c])
+            continue;
+        i32 at = --first[c];
+        rows[at] = (i32)i;
+        height_of_row[at] = height[i];
+    }
+}
+
+/* Occupied cells among the nine around a place; returns how many there are. */
+static ALWAYS_INLINE i32 cells_around(const CellMap *map, i32 place, i32 around[9])
+{
+    i32 n = 0;
+    for (i32 row = -map->side; row <= map->side; row += map->side)
+        for (i32 column = -1; column <= 1; column++) {
+            i32 c = cell_at(map, place + row + column);
+            if (c != NONE)
+                around[n++] = c;
+        }
+    return n;
+}
+
+/* PorosityFinder.airborne_points: whether each of n_points points is airborne. Scratch: `place` and `wanted`, (n,),
+ * `first`, (n + 1,), and `rows` and `height_of_row` of all points. */
 EXPORT void modt_airborne_points(const PorosityRules *r, const Grid *grid, const Cells *cells, const float *sqrt_range,
                                  const float *beam_m, const uint8_t *airborne, float rays_sqrt_range, i32 n,
-                                 const i64 *rows, const i64 *offsets, const float *height, i32 *place,
-                                 float *height_of_row, uint8_t *is_air)
+                                 const i64 *cell_of_point, const float *height, i64 n_points, i32 *place,
+                                 uint8_t *wanted, i32 *first, i32 *rows, float *height_of_row, uint8_t *is_air)
 {
     const CellMap map = map_of(grid, cells, n, place);
-    for (i64 k = 0; k < offsets[n]; k++)
-        height_of_row[k] = height[rows[k]];
+    i32 around[9];
+    for (i32 c = 0; c < n; c++)
+        wanted[c] = 0;
+    for (i32 c = 0; c < n; c++)
+        if (!airborne[c] && sqrt_range[c] < r->point_sqrt_range)
+            for (i32 n_around = cells_around(&map, place[c], around), a = 0; a < n_around; a++)
+                wanted[around[a]] = 1;
+    sort_points(wanted, n, cell_of_point, height, n_points, first, rows, height_of_row);
+    for (i64 i = 0; i < n_points; i++)
+        is_air[i] = airborne[cell_of_point[i]];
     for (i32 c = 0; c < n; c++) {
-        for (i64 k = offsets[c]; airborne[c] && k < offsets[c + 1]; k++)
-            is_air[rows[k]] = 1;
         if (airborne[c] || !(sqrt_range[c] < r->point_sqrt_range))
             continue;
         float reach_m = maxf(r->reach_m, r->reach_beams * beam_m[c]);
         float enough = r->min_solidity * columns_at(rays_sqrt_range, sqrt_range[c]) * (2.0f * reach_m / beam_m[c] + 1.0f);
-        i32 around[9], n_around = 0;
-        for (i32 row = -map.side; row <= map.side; row += map.side)
-            for (i32 column = -1; column <= 1; column++) {
-                around[n_around] = cell_at(&map, place[c] + row + column); /* overwritten by the next, if there is none */
-                n_around += around[n_around] != NONE;
-            }
-        for (i64 k = offsets[c]; k < offsets[c + 1]; k++) {
+        i32 n_around = cells_around(&map, place[c], around);
+        for (i32 k = first[c]; k < first[c + 1]; k++) {
             i32 count = 0;
             for (i32 a = 0; a < n_around && (float)count < enough; a++)
-                for (i64 other = offsets[around[a]]; other < offsets[around[a] + 1]; other++)
+                for (i32 other = first[around[a]]; other < first[around[a] + 1]; other++)
                     count += magnitude(height_of_row[k] - height_of_row[other]) <= reach_m;
             is_air[rows[k]] = (float)count < enough;
         }
     }
+}
+
+/* Above.without: the points that are not airborne among n_tall tall ones, then the other n - n_tall, as rows of the
+ * sweep with their columns and heights; returns how many there are. */
+EXPORT i64 modt_without(const i64 *rows, const PointColumns *points, const float *height, const uint8_t *is_air,
+                        i64 n_tall, i64 n, int8_t *kind, i64 *kept_rows, const PointColumns *kept, float *kept_height)
+{
+    i64 count = 0;
+    for (i64 i = 0; i < n; i++) {
+        if (i < n_tall && is_air[i]) {
+            kind[rows[i]] = AIRBORNE_KIND;
+            continue;
+        }
+        kept_rows[count] = rows[i];
+        kept->x[count] = points->x[i];
+        kept->y[count] = points->y[i];
+        kept->z[count] = points->z[i];
+        kept->sqrt_range[count] = points->sqrt_range[i];
+        kept_height[count++] = height[i];
+    }
+    return count;
 }
 
 /* low_points: places of what may be low things or feet, and of a tall point beside each, or NONE; returns how many

@@ -76,7 +76,7 @@ typedef struct {
 /* PointKind of types/proposals.py */
 enum {
     MEMBER_KIND = 0, GROUND_KIND = -1, STRUCTURE_KIND = -2, LOW_KIND = -3, SPARSE_KIND = -4, OVERHEAD_KIND = -5,
-    OUT_OF_RANGE_KIND = -6
+    OUT_OF_RANGE_KIND = -6, AIRBORNE_KIND = -9
 };
 
 /* pseudo_angle of geometry/bearings.py: direction of a point as a number from 0 to 4 */

@@ -67,6 +67,7 @@ class Kernels(GeometryKernels):
     air = staticmethod(PorosityFinder.air)
     mean_solidity = staticmethod(mean_solidity)
     airborne_points = staticmethod(PorosityFinder.airborne_points)
+    without = staticmethod(Above.without)
     find_people = staticmethod(find_people)
     view_bounds = staticmethod(view_bounds)
     merge_strips = staticmethod(merge_strips)

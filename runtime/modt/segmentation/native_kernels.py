@@ -179,8 +179,8 @@ class NativeKernels(NativeGeometryKernels, Kernels):
     def airborne_points(self, finder: PorosityFinder, found: Clusters) -> Bool:
         """(K,) airborne points."""
         n = len(found.cells)
-        points_of_cell = self.group(found.cell_of_point, n)
-        is_air = np.zeros(len(found.height), np.bool_)
+        n_points = len(found.height)
+        is_air = np.empty(n_points, np.bool_)
         self.library.modt_airborne_points(
             self._structure(POROSITY_RULES.of, finder),
             self._structure(_grid, finder.grid),
@@ -190,14 +190,37 @@ class NativeKernels(NativeGeometryKernels, Kernels):
             found.air.airborne,
             finder.rays_sqrt_range,
             n,
-            points_of_cell.rows,
-            points_of_cell.offsets,
+            found.cell_of_point,
             found.height,
+            n_points,
             np.empty(n, np.int32),
-            np.empty(len(is_air), np.float32),
+            np.empty(n, np.bool_),
+            np.empty(n + 1, np.int32),
+            np.empty(n_points, np.int32),
+            np.empty(n_points, np.float32),
             is_air,
         )
         return is_air
+
+    def without(self, above: Above, is_air: Bool) -> Above:
+        """The points without the airborne ones among the K, of a (K,) mask."""
+        n = len(above.rows)
+        rows = np.empty(n, np.int64)
+        *columns, height = np.empty((5, n), np.float32)
+        kept = self.library.modt_without(
+            above.rows,
+            POINT_COLUMNS.of(above.points),
+            above.height_m,
+            is_air,
+            above.n_tall,
+            n,
+            above.kind,
+            rows,
+            POINT_COLUMNS.of(PointColumns(*columns)),
+            height,
+        )
+        points = PointColumns(*(column[:kept] for column in columns))
+        return above._replace(rows=rows[:kept], points=points, height_m=height[:kept])
 
     def cluster(
         self, clusterer: CellClusterer, cells: Cells, sampled: PointColumns, beam_m: Float32

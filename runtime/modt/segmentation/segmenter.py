@@ -77,7 +77,7 @@ class Segmenter:
         cells = self.clusterer.occupied_cells(*above.tall)
         is_air = self.clusterer.airborne_points(cells)
         if is_air is not None:
-            above = above.without(is_air)
+            above = self.kernels.without(above, is_air)
             cells = self.clusterer.occupied_cells(*above.tall)
         tall = self.clusterer.cluster(cells, PointKind.SPARSE if is_air is None else PointKind.AIRBORNE)
         tall = self._seen(tall)
