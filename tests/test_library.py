@@ -159,6 +159,15 @@ def test_points_without_reflectance_and_without_returns_are_taken(frames):
     assert len(library.step(np.zeros((0, 4)), 0.1).objects()) == 0
 
 
+@pytest.mark.parametrize("columns", [3, 4])
+def test_points_stored_column_by_column_give_the_same_tracks(frames, columns):
+    points = frames[0].points[:, :columns]
+    expected = modt.Pipeline.from_profile("vlp-16").step(points, 0.0)
+    found = modt.Pipeline.from_profile("vlp-16").step(np.asfortranarray(points), 0.0)
+    assert len(found) > 0
+    np.testing.assert_array_equal(found.box_world, expected.box_world)
+
+
 @pytest.fixture(scope="module", name="library")
 def a_pipeline_in_use():
     library = modt.Pipeline.from_profile("vlp-16")

@@ -363,8 +363,8 @@ class Pipeline:
 
 
 def _checked_points(points: ArrayLike) -> Float32:
-    """(N, 4) finite points. A missing fourth column is filled with unrecorded reflectance."""
-    rows = np.array(points, np.float32)
+    """(N, 4) contiguous finite points. A missing fourth column is filled with unrecorded reflectance."""
+    rows = np.array(points, np.float32, order="C")  # row by row, as the kernels read them
     if rows.ndim != 2 or rows.shape[1] not in (3, 4):
         raise MisuseError("points", f"of shape {rows.shape}", "give rows of x, y, z or x, y, z, reflectance")
     if rows.shape[1] == 3:
