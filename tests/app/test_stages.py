@@ -379,6 +379,18 @@ def test_beams_that_the_source_knows_are_used_unless_a_sensor_is_asked_for(asked
     assert chosen.sensor == sensor
 
 
+@pytest.mark.parametrize(("every", "step_deg"), [(1, 0.2), (2, 0.4), (5, 0.2)])
+def test_a_head_at_twice_the_speed_of_a_named_profile_has_returns_twice_as_far_apart(every, step_deg, caplog):
+    """At other speeds the profile is kept as it was asked for."""
+    frame = frames()[0]
+    column = np.rint(np.rad2deg(np.arctan2(frame.points[:, 1], frame.points[:, 0])) / 0.2).astype(int)
+    faster = dataclasses.replace(frame, points=frame.points[column % every == 0])
+    chosen = choose(profile.resolve("vlp-16"), faster, None)
+    assert chosen.config.sensor.azimuth_step_deg == pytest.approx(step_deg)
+    assert chosen.fits == (every < 5)
+    assert ("2 times the speed of profile vlp-16" in caplog.text) == (every == 2)
+
+
 def test_a_displaced_sensor_keeps_its_profile_until_it_is_back(monkeypatch):
     stages = stages_of()
     frame = frames()[0]

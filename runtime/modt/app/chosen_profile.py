@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from modt import profile
 from modt.app.assembly import sensor_profile
 from modt.config import ProfileConfig
@@ -17,6 +19,8 @@ log = logging.getLogger(__name__)
 
 FOUND = "as found"
 """Name of a sensor's profile that the first sweep has replaced."""
+STEP_DEG = 0.01, 10.0
+"""Least and greatest step along a beam that a profile may state [deg]."""
 GIVEN = "given"
 """Name of a configuration that a program has given."""
 
@@ -64,6 +68,7 @@ def choose(requested: Resolved | ProfileConfig, first: Frame | None, info: Strea
     if config.sensors:
         return _several(config, requested.used(""), first)
     if requested.sensor:
+        config = _at_speed_of(first, config, requested.sensor)
         recognition = _compared(first, config, requested.sensor, replaced=False)
         return ChosenProfile(recognition.mounted(config), requested.sensor, requested.used(""), recognition)
     base = info.profile if info and info.profile else profile.DEFAULT
@@ -78,6 +83,7 @@ def _given(config: ProfileConfig, first: Frame | None) -> ChosenProfile:
     """The configuration that a program has given."""
     if config.sensors:
         return _several(config, (GIVEN,), first)
+    config = _at_speed_of(first, config, GIVEN)
     recognition = _compared(first, config, GIVEN, replaced=False)
     return ChosenProfile(recognition.mounted(config), GIVEN, (GIVEN,), recognition)
 
@@ -93,6 +99,26 @@ def _several(config: ProfileConfig, names: tuple[str, ...], first: Frame | None)
         differences += [] if found.fits else [f"{mounted.name}: {difference}" for difference in found.differences]
     of_sensors = " + ".join(mounted.profile for mounted in config.sensors)
     return ChosenProfile(config, of_sensors, names, Recognition(tuple(differences), None, config))
+
+
+def _at_speed_of(first: Frame | None, config: ProfileConfig, name: str) -> ProfileConfig:
+    """The profile of a name at the speed of the head at which the first sweep fits it; as it is if at none.
+
+    A head that turns twice as fast as that of the profile leaves returns twice as far apart. The beams are the same.
+    """
+    if first is None or recognise(first.points, config).fits:
+        return config
+    for speed in (0.5, 2.0):
+        step_deg = float(np.clip(speed * config.sensor.azimuth_step_deg, *STEP_DEG))
+        turned = replace(config, sensor=replace(config.sensor, azimuth_step_deg=step_deg))
+        if recognise(first.points, turned).fits:
+            log.warning(
+                "the head turns at %g times the speed of profile %s: its returns are taken as %.3g deg apart; "
+                "sensor.azimuth_step_deg of a profile states it",
+                *(speed, name, step_deg),
+            )
+            return turned
+    return config
 
 
 def _compared(first: Frame | None, config: ProfileConfig, name: str, *, replaced: bool) -> Recognition:
