@@ -81,6 +81,17 @@ def test_a_stationary_car_that_comes_into_view_has_no_speed():
     assert follower.tracks.x[0, 3] < 0.5
 
 
+def test_what_is_seen_through_a_gap_says_little_about_the_speed_of_a_car():
+    """Both ends of what is seen are those of the gap, and stay, while the car drives on."""
+    follower = Follower()
+    follower.run([[box(20, 0.5 * k - 6, 1.6, 4.3)] for k in range(11)], CAR, points=400)
+    assert follower.tracks.velocity[0] == pytest.approx([0, 5], abs=0.3)
+    for k in range(11, 16):
+        follower.follow(*frame_of([box(20, 0.5, 1.6, 1.2)], k, points=100))
+        error = follower.tracks.velocity[0] - [0, 5]
+        assert error @ np.linalg.solve(follower.tracks.velocity_covariance[0], error) < 10
+
+
 def test_two_cars_in_a_row_stay_two():
     follower = Follower()
     for points in ((80, 40), (40, 80), (80, 40)):

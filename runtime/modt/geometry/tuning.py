@@ -31,7 +31,8 @@ class ShapeTuning:
 
     disagreement: float = 0.3
     """Standard deviation of a displacement by ends that disagree, relative to the disagreement, or to the width if
-    that is less. Greater: the filter trusts such axes less.
+    that is less; of a car of which less than half is seen, also relative to the part of its known width that is
+    not seen. Greater: the filter trusts such axes less.
     Chosen on: simulated drives, by the consistency of the filter (NEES)."""
 
     near_cosine: float = 0.5

@@ -6,7 +6,7 @@ import numpy as np
 
 from modt.class_sizes import IS_PERSON
 from modt.classes import ObjectClass
-from modt.geometry.kdop import DIRECTIONS, PairWeights, Shapes
+from modt.geometry.kdop import DIRECTIONS, PairWeights, Shapes, widths
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
 from modt.tracking.association import Associated, Matches
@@ -117,6 +117,12 @@ def measured(
     sight = observations.sight(proposals) * (is_car & moves)
     # The place of what rests stays in doubt. What moves is measured from where it was measured last.
     before = tracks.end_variance.T.take(rows, axis=1) * ~moves
+    # What is seen of a car between two things that hide the rest may lie anywhere within what is known of it.
+    known_m = widths(tracks.envelope.T.take(rows, axis=1))
+    seen_m = widths(kdop)
+    is_part = is_car & (seen_m.max(axis=0) < known_m.max(axis=0) / 2)
+    unseen_m = np.maximum(known_m - seen_m, 0.0) * is_part
+    before = np.maximum(before, np.square(kernels.shape_tuning.disagreement * unseen_m))
     shift, covariance, end_variance = kernels.measured(mean, kdop, sight, variance, before)
     position = x + shift
     # Arms, legs and wheels reach out in turn, while the centroid goes with the body.
