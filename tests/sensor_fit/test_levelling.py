@@ -6,12 +6,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from modt.geometry import inverse, rotation_zyx, se3, transform, yaw_of
+from modt.geometry import rotation_zyx, se3, transform, yaw_of
 from modt.placement import LEVEL, Mount
 from modt.sensor_fit.floor_slope import floor_slope
 from modt.sensor_fit.levelling import STEADY_SWEEPS, Leveller, untwisted
 from modt.types import Frame
-from modt_simulation.gait import Gait
 from modt_simulation.synthetic_stream import SyntheticStream
 
 SWEEPS = 14
@@ -115,7 +114,7 @@ def test_without_a_floor_roll_and_pitch_of_the_poses_count_and_else_the_mount():
     assert tilt_left_deg(frame, level) < 1.0
 
 
-def floor(slope, rate, depth_m=0.8, n=2000, outliers=0.3):
+def floor(slope, rate, bend=(0.0, 0.0), depth_m=0.8, n=2000, outliers=0.3):
     """(3, n) points of a sloping floor, of which a share stands above it, and their (n,) delays [s]."""
     rng = np.random.default_rng(2)
     distance_m = rng.uniform(1.5, 11, n)
@@ -123,19 +122,28 @@ def floor(slope, rate, depth_m=0.8, n=2000, outliers=0.3):
     x = distance_m * np.cos(bearing)
     y = distance_m * np.sin(bearing)
     delay_s = -bearing * 0.1 / (2 * np.pi)
-    z = -depth_m - (slope[0] + delay_s * rate[0]) * x - (slope[1] + delay_s * rate[1]) * y
+    x_slope, y_slope = (s + delay_s * (r + delay_s * b) for s, r, b in zip(slope, rate, bend, strict=True))
+    z = -depth_m - x_slope * x - y_slope * y
     z += rng.normal(0, 0.01, n) + np.where(rng.random(n) < outliers, rng.uniform(0.3, 2.0, n), 0.0)
     return np.stack([x, y, z]), delay_s
 
 
 @pytest.mark.parametrize(
-    ("slope_deg", "rate_degps"), [((0, 0), (0, 0)), ((6, -5), (60, 30)), ((-14, 9), (-70, 70)), ((0.5, 1), (0, -20))]
+    ("slope_deg", "rate_degps", "bend_degps2"),
+    [
+        ((0, 0), (0, 0), (0, 0)),
+        ((6, -5), (60, 30), (0, 0)),
+        ((-14, 9), (-70, 70), (0, 0)),
+        ((0.5, 1), (0, -20), (0, 0)),
+        ((5, -6), (10, 20), (-450, 400)),
+    ],
 )
-def test_slope_and_its_change_are_measured_in_one_sweep(slope_deg, rate_degps):
-    xyz, delay_s = floor(np.deg2rad(slope_deg), np.deg2rad(rate_degps))
+def test_slope_and_its_change_are_measured_in_one_sweep(slope_deg, rate_degps, bend_degps2):
+    xyz, delay_s = floor(np.deg2rad(slope_deg), np.deg2rad(rate_degps), np.deg2rad(bend_degps2))
     found = floor_slope(xyz, delay_s, np.zeros(2), 0.8)
     np.testing.assert_allclose(np.rad2deg(found.slope), slope_deg, atol=0.3)
-    np.testing.assert_allclose(np.rad2deg(found.rate), rate_degps, atol=6.0)
+    np.testing.assert_allclose(np.rad2deg(found.twist[0]), rate_degps, atol=6.0)
+    np.testing.assert_allclose(np.rad2deg(found.twist[1]), bend_degps2, atol=120.0)
     assert found.depth_m == pytest.approx(0.8, abs=0.03)
 
 
@@ -152,15 +160,12 @@ def test_where_no_floor_shows_there_is_none():
 def test_untwisted_points_are_as_seen_at_the_stamp():
     rng = np.random.default_rng(4)
     seen = rng.normal(0, 8, (400, 4)).astype(np.float32)
-    rate = np.deg2rad([60.0, -40.0])
+    twist = np.deg2rad([[60.0, -40.0], [300.0, -200.0]])
     delay_s = -np.arctan2(seen[:, 1], seen[:, 0]) * 0.1 / (2 * np.pi)
-    walk_on = Gait(0.0, 1.0, (0.0, 0.0))
-    np.testing.assert_allclose(walk_on.pose(0.3), np.eye(4))
-    back = untwisted(Frame(0, 0.0, seen, turn_s=0.1), rate).points[:, :3]
+    back = untwisted(Frame(0, 0.0, seen, turn_s=0.1), twist).points[:, :3]
     for k in range(len(seen)):
-        x_slope, y_slope = np.arctan(delay_s[k] * rate)
+        x_slope, y_slope = np.arctan(delay_s[k] * (twist[0] + delay_s[k] * twist[1]))
         # z of the normal falls along x by the slope: the sensor has pitched by -x_slope and rolled by y_slope
         T = se3(rotation_zyx(y_slope, -x_slope, 0.0), np.zeros(3))
         expected = transform(T, seen[k : k + 1, :3].astype(np.float64))[0]
         assert np.linalg.norm(back[k] - expected) < 0.02 * max(1.0, 0.1 * np.linalg.norm(expected))
-    assert np.linalg.norm(inverse(np.eye(4)) - np.eye(4)) == 0

@@ -30,6 +30,8 @@ MAX_ERROR = np.deg2rad(0.7)
 """Greatest standard deviation of a slope that is used."""
 MAX_RATE_PER_S = 1.0
 """Slopes change at most about as fast [1/s]. A floor that shows less of its change is taken to be steadier."""
+MAX_BEND_PER_S2 = 8.0
+"""Half the change of that change is at most about as great [1/s2]; 6 degrees at 2 Hz reach it."""
 MAX_BELOW_SHARE = 0.15
 """Greatest number of points below a floor over that of the points on it."""
 
@@ -40,12 +42,13 @@ class FloorSlope:
 
     Attributes:
         slope: (2,) along x and y; these are x and y of the upward normal over its z.
-        rate: (2,) change of the slope [1/s].
+        twist: (2, 2) its rate along x and y at the stamp [1/s], and half the change of the rate [1/s2]. A robot that
+            walks turns back within a sweep.
         depth_m: depth below the sensor.
     """
 
     slope: Float64
-    rate: Float64
+    twist: Float64
     depth_m: float
 
 
@@ -68,8 +71,8 @@ def floor_slope(xyz: Float64, delay_s: Float64, expected: Float64, depth_m: floa
     delay_s = delay_s[kept]
     range_m = range_m[kept]
     fall = -z[kept]  # rows of the plane times its depth and slopes on the floor
-    rows = np.stack([np.ones(len(x)), x, y, delay_s * x, delay_s * y])
-    plane = np.zeros(5)
+    rows = np.stack([np.ones(len(x)), x, y, delay_s * x, delay_s * y, delay_s**2 * x, delay_s**2 * y])
+    plane = np.zeros(7)
     plane[0] = depth_m
     few = slice(None, None, 1 + len(x) // MAX_TRIED)
     plane[1:3] = _tried(rows[1:3, few], fall[few] - depth_m, TRIED_M + TRIED_SLOPE * range_m[few], expected)
@@ -77,16 +80,17 @@ def floor_slope(xyz: Float64, delay_s: Float64, expected: Float64, depth_m: floa
 
 
 def _fitted(rows: Float64, fall: Float64, range_m: Float64, plane: Float64) -> FloorSlope | None:
-    """The floor by least squares, from a tried plane (5,); None if too few points lie on it, or too many below.
+    """The floor by least squares, from a tried plane (7,); None if too few points lie on it, or too many below.
 
     Args:
-        rows: (5, n) of the points: 1, x, y, and x and y times the delay.
+        rows: (7, n) of the points: 1, x, y, and x and y times the delay and its square.
         fall: (n,) depth of the points, which is plane . rows on the floor.
         range_m: (n,) range of the points.
-        plane: depth, slopes along x and y, and their changes.
+        plane: depth, slopes along x and y, their rates, and half the changes of the rates.
     """
-    prior = np.full(5, NOISE_M**2)  # of slopes of 1; it holds what the points leave open
-    prior[3:] /= MAX_RATE_PER_S**2
+    prior = np.full(7, NOISE_M**2)  # of slopes of 1; it holds what the points leave open
+    prior[3:5] /= MAX_RATE_PER_S**2
+    prior[5:] /= MAX_BEND_PER_S2**2
     normal = np.diag(prior)
     near: Bool = np.zeros(len(fall), np.bool_)
     for growth in NEAR_SLOPES:
@@ -100,7 +104,7 @@ def _fitted(rows: Float64, fall: Float64, range_m: Float64, plane: Float64) -> F
     below = _below_m(rows, fall, plane) > 3 * (NEAR_M + NEAR_SLOPES[-1] * range_m)
     if error.max() > MAX_ERROR or np.count_nonzero(below) > MAX_BELOW_SHARE * np.count_nonzero(near):
         return None
-    return FloorSlope(plane[1:3], plane[3:], float(plane[0]))
+    return FloorSlope(plane[1:3], plane[3:].reshape(2, 2), float(plane[0]))
 
 
 def _below_m(rows: Float64, fall: Float64, plane: Float64) -> Float64:

@@ -72,13 +72,13 @@ class Leveller:
         posed = self._slope_of_pose(frame)
         floor = self._floor(frame, posed) if self._looks_now(posed) else None
         self._notice(floor, posed)
-        slope, rate = self._attitude(floor, posed, frame.time_s)
+        slope, twist = self._attitude(floor, posed, frame.time_s)
         self._last = None if floor is None else floor.slope, posed
         self._last_s = frame.time_s
         self._sweeps += 1
         self.attitude = self._mount if slope is None else Mount.upright(self._up(slope))
         level = self.attitude.level(frame)
-        return level if rate is None or not level.turn_s else untwisted(level, rate)
+        return level if twist is None or not level.turn_s else untwisted(level, twist)
 
     def _looks_now(self, posed: Float64 | None) -> bool:
         """Whether the floor of this sweep is searched. Poses tell by themselves whether the robot is steady."""
@@ -135,17 +135,17 @@ class Leveller:
     def _attitude(
         self, floor: FloorSlope | None, posed: Float64 | None, time_s: float
     ) -> tuple[Float64 | None, Float64 | None]:
-        """(2,) slope of the floor to the mount, and its change [1/s]; None where the mount alone counts."""
+        """(2,) slope of the floor to the mount, and its (2, 2) twist; None where the mount alone counts."""
         if not self._unsteady:
             return (self._mean, None) if np.abs(self._mean).max() > MIN_SLOPE else (None, None)
-        rate = None if floor is None else floor.rate
+        twist = None if floor is None else floor.twist
         if posed is None or self._offset is None:
-            return (None if floor is None else floor.slope), rate
+            return (None if floor is None else floor.slope), twist
         _, last = self._last
         passed_s = time_s - self._last_s
-        if rate is None and last is not None and passed_s > 0:
-            rate = (posed - last) / passed_s
-        return posed - self._offset, rate
+        if twist is None and last is not None and passed_s > 0:
+            twist = np.stack([(posed - last) / passed_s, np.zeros(2)])
+        return posed - self._offset, twist
 
     def _up(self, slope: Float64) -> Float64:
         """(3,) upward normal of the floor in the sensor frame, by its slope to the mount."""
@@ -159,13 +159,19 @@ def delays_s(frame: Frame) -> Float64:
     return np.asarray(from_middle(np.arctan2(y, x), frame.mid_rad) * (-frame.turn_s / (2 * np.pi)))
 
 
-def untwisted(frame: Frame, rate: Float64) -> Frame:
-    """A level sweep as if the sensor had not rolled and pitched during it; (2,) rate of the slope [1/s]."""
+def untwisted(frame: Frame, twist: Float64) -> Frame:
+    """A level sweep as if the sensor had not rolled and pitched during it.
+
+    Args:
+        frame: the sweep.
+        twist: (2, 2) as in FloorSlope.
+    """
     points: Float32 = frame.points.copy()
     x, y, z = frame.points.T[:3]
     delay_s = delays_s(frame).astype(np.float32)
-    x_slope = delay_s * np.float32(rate[0])
-    y_slope = delay_s * np.float32(rate[1])
+    x_twist, y_twist = twist.T.astype(np.float32)
+    x_slope = delay_s * (x_twist[0] + delay_s * x_twist[1])
+    y_slope = delay_s * (y_twist[0] + delay_s * y_twist[1])
     points[:, 0] -= x_slope * z
     points[:, 1] -= y_slope * z
     points[:, 2] += x_slope * x + y_slope * y

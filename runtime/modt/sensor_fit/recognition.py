@@ -141,10 +141,10 @@ def _untwisted_pattern(points: Float32) -> BeamPattern | None:
     some = slice(None, None, 1 + len(points) // FLOOR_SAMPLE)
     xyz = level.points[some].T[:3].astype(np.float64)
     twisted = floor_slope(xyz, delays_s(level)[some], np.zeros(2), floor.depth_m)
-    if twisted is None or np.abs(twisted.rate).max() < MIN_TWIST:
+    if twisted is None or np.abs(twisted.twist[0]).max() < MIN_TWIST:
         return None
     back = Mount(None if mount.R_level_sensor is None else mount.R_level_sensor.T)
-    pattern = find_beams([back.turn(untwisted(level, twisted.rate).points)], COARSE_ORIGINS_M)
+    pattern = find_beams([back.turn(untwisted(level, twisted.twist).points)], COARSE_ORIGINS_M)
     return pattern if pattern is not None and len(pattern.elevations_deg) else None
 
 
