@@ -220,7 +220,7 @@ def _moved_at_once(before: Sample, between: Sample, after: Sample) -> Float64:
     """Plane (3,) by which most of the cells moved from one of three sweeps to the next.
 
     What happens to a sensor does not wait for its seam. Some directions of the sweep in which it begins show it
-    already, so each cell is taken where it moved farther. Half of a slope that is driven over counts, like this.
+    already, so each cell is taken where it moved farther. Of a slope that is driven over, about half counts.
     """
     cells = np.flatnonzero(np.isfinite(before.lowest_m) & np.isfinite(between.lowest_m) & np.isfinite(after.lowest_m))
     if len(cells) < MIN_CELLS:
