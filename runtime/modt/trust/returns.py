@@ -73,6 +73,11 @@ class ReturnsCheck:
         count = self._count(samples[-1])
         return self._lost_sectors(samples, least) or self._dead_bands(samples) or self._thinned(count, least)
 
+    @property
+    def n_dead(self) -> int:
+        """Number of bands without returns, at the last look."""
+        return int(np.count_nonzero(self._dead))
+
     def _lost_sectors(self, samples: Sequence[Sample], least: float) -> Loss | None:
         """Sectors with hardly a return, of those that usually have at least some.
 

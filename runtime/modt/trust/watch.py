@@ -173,9 +173,10 @@ class TrustWatch:
     def _run_own_checks(self, sweep: Sample) -> dict[str, Finding]:
         """Run the checks of the sweeps themselves, and return their findings by the name of the check."""
         repeated = _repeated(self._samples[-2], sweep)
+        n_dead = self._returns.n_dead
         loss = self._returns.loss(self._samples)
         if not repeated and not self._repeated:
-            self._follow()
+            self._follow(same_beams=self._returns.n_dead == n_dead)
         self._repeated = repeated
         lost = repeated or (loss is not None and loss.blind)
         if not lost and self._before_loss is not None and not self.displaced:
@@ -207,8 +208,11 @@ class TrustWatch:
             what = f"no returns from {from_deg} to {to_deg} deg, counter-clockwise from ahead"
             yield "sectors", Finding(TrustLevel.DEGRADED, what, UNCOVER)
 
-    def _follow(self) -> None:
-        """Compare the sweeps since the last look with one another. Obstacles are told by the ground below them."""
+    def _follow(self, *, same_beams: bool) -> None:
+        """Compare the sweeps since the last look with one another. Obstacles are told by the ground below them.
+
+        Other beams meet other obstacles, so the scene is not compared at a look at which beams have died or are back.
+        """
         threes = list(_threes(self._samples))
         pairs = [(before, after) for before, _, after in threes]
         first = self._samples[0]
@@ -222,6 +226,8 @@ class TrustWatch:
         if self._ground.undone:  # the returns were learned while the sensor was moved
             self._returns = ReturnsCheck(self._tuning.returns)
         on_moved_ground = moves or self._ground.undone or bool(self._ground.phrase)
+        if not same_beams:
+            return
         changed_after = self._scene.before
         self._scene.look(first, now, pairs, self._tuning.back_looks, on_moved_ground=on_moved_ground)
         if changed_after is not None and self._scene.change.is_none:
