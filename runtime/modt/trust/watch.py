@@ -173,10 +173,11 @@ class TrustWatch:
     def _run_own_checks(self, sweep: Sample) -> dict[str, Finding]:
         """Run the checks of the sweeps themselves, and return their findings by the name of the check."""
         repeated = _repeated(self._samples[-2], sweep)
-        n_dead = self._returns.n_dead
+        n_before = self._returns.n_dead
         loss = self._returns.loss(self._samples)
+        n_dead = self._returns.n_dead
         if not repeated and not self._repeated:
-            self._follow(same_beams=self._returns.n_dead == n_dead)
+            self._follow(same_beams=n_dead == n_before and n_dead <= MOST_DEAD)
         self._repeated = repeated
         lost = repeated or (loss is not None and loss.blind)
         if not lost and self._before_loss is not None and not self.displaced:
@@ -212,6 +213,7 @@ class TrustWatch:
         """Compare the sweeps since the last look with one another. Obstacles are told by the ground below them.
 
         Other beams meet other obstacles, so the scene is not compared at a look at which beams have died or are back.
+        The few rings of the last beams are no scene.
         """
         threes = list(_threes(self._samples))
         pairs = [(before, after) for before, _, after in threes]
@@ -248,6 +250,8 @@ MAX_SUDDEN_S = 0.25
 """Longest time between two frames of which a step tells that it came at once [s]."""
 SAME_PLACE_M = 1.0
 """Greatest way between two sweeps that show the same scene [m]."""
+MOST_DEAD = 8
+"""Greatest number of dead bands of beams, of 12, with which scenes are compared."""
 MOST_SAMPLES = 24
 """Greatest number of frames between two looks that are kept."""
 OWN_CHECKS = frozenset({"frozen", "returns", "scene", "ground"})
