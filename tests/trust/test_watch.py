@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from modt.geometry import rotation_zyx
+from modt.geometry import rotation_zyx, se3
 from modt.profile import load
 from modt.trust.watch import Finding, TrustWatch
 from modt.types import Frame, TrustLevel
@@ -118,6 +118,28 @@ def test_a_fault_that_begins_and_ends_within_a_sweep_is_reported_and_withdrawn_l
     assert (levels[:ONSET] == TrustLevel.GOOD).all()
     assert (levels[ONSET + 20 : END] > TrustLevel.GOOD).all()
     assert levels[-1] == TrustLevel.GOOD
+
+
+@pytest.mark.parametrize("scene", ["street", "yard"])
+@pytest.mark.parametrize("share", [0.3, 0.5, 0.7])
+def test_few_beams_are_no_turned_scene(scene, share):
+    """With two rings of obstacles the registration is lost, and they are little like the scene before and after."""
+    watch = TrustWatch(load(SENSOR).sensor)
+    keys = set()
+    for k, frame in enumerate(drive(scene)):
+        points = faulty_from(few_beams, share, k, frame.points)
+        lost = np.deg2rad(25.0) * np.clip(k - ONSET, 0, END - ONSET)
+        T_world_sensor = frame.T_world_sensor @ se3(rotation_zyx(0.0, 0.0, float(lost)), np.zeros(3))
+        keys.update(watch.add(replace(frame, points=points, T_world_sensor=None), T_world_sensor).keys)
+    assert "returns" in keys
+    assert "scene" not in keys
+
+
+def few_beams(points, k):
+    """Points of every eighth beam, a tenth nearer."""
+    beam = np.rint((np.rad2deg(np.arctan(tangent(points))) + 15) / 2).astype(int)
+    few = points[beam % 8 == 0]
+    return np.column_stack([0.9 * few[:, :3], few[:, 3]]).astype(np.float32)
 
 
 def faulty_from(fault, share, k, points):

@@ -118,7 +118,9 @@ class SceneCheck:
         *,
         on_moved_ground: bool = False,
     ) -> None:
-        """Notice a scene that changes at once, and one that is back; `pairs` of sweeps are at most one sweep apart.
+        """Notice a scene that changes at once, and one that is back.
+
+        `pairs` are those of sweeps since `first` with one sweep between them; the others as in the ground's check.
 
         On a ground that has moved, obstacles are less sure, so a change has to explain nearly all of them. A scale is
         told by the ground alone.
