@@ -65,7 +65,10 @@ def trace(lowest, top, estimator, height_m, max_slope_deg):
             flat_m = estimator.flat_m[ring] + max(slope, 0.0) * estimator.depth_m[ring]
             here, behind = top[ring : ring + 2, ray][[0, -1]] - lowest[ring, ray]
             flat = here <= flat_m
-            may_rise = flat and (behind <= flat_m or at > 0)
+            further = lowest[ring + 1 : min(ring + 1 + ground.rings_behind, estimator.near_rings), ray]
+            further = further[np.isfinite(further)]
+            stays_up = len(further) > 0 and further.min() > lowest[ring, ray] - np.float32(ground.noise_m)
+            may_rise = flat and (at > 0 or (behind <= flat_m and stays_up))
             may_fall = off > -gap * max_slope - ground.noise_m
             is_ground[ring, ray] = (
                 may_fall and off < (min(gap, near) * max_slope if may_rise else 0.0) + ground.noise_m

@@ -126,6 +126,27 @@ def test_a_car_that_hides_all_ground_before_it_is_not_ground():
     assert height == pytest.approx(car[:, 2] + HEIGHT_M, abs=0.15)
 
 
+@pytest.mark.parametrize("x", [1.4, 1.8, 2.2])
+@pytest.mark.parametrize("top_m", [0.28, 0.4])
+@pytest.mark.parametrize(
+    ("elevation", "height_m"),
+    [
+        (scans.VLP_16, 0.8),
+        (np.deg2rad(np.linspace(-22.5, 22.5, 64)), 0.8),
+        (np.deg2rad(np.linspace(-7, 52, 60)), 0.3),
+    ],
+    ids=["vlp-16", "os1-64", "dome"],
+)
+def test_what_lies_nearer_than_all_visible_ground_is_not_ground(x, top_m, elevation, height_m):
+    """A low wall, as wide as a car is long, of which the sensor sees the top and the upper part of the front."""
+    points, on = scans.scan([(x, 0.0, 0.4, 4.0, 0.0, top_m)], height_m, elevation)
+    height = heights(points, ground(height_m=height_m, min_range_m=0.4), height_m)
+    wall = on > 0
+    assert wall.sum() > 50
+    assert height[wall] == pytest.approx(points[wall, 2] + height_m, abs=0.12)
+    assert (np.abs(height[~wall]) < 0.1).all()
+
+
 def test_reflections_below_the_ground_do_not_lower_it():
     points, _ = scans.scan()
     rng = np.random.default_rng(3)

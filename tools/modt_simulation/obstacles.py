@@ -229,6 +229,17 @@ def lying(rng: Generator, seconds: float, height_m: float) -> World:
     return _level(builder, Material.PAVING, height_m)
 
 
+def clutter(rng: Generator, seconds: float, height_m: float) -> World:
+    """Logs, boxes and low walls, knee-high at most, most of them nearer than the ground that the robot sees."""
+    builder = SceneBuilder(rng, seconds)
+    for _ in range(10):
+        size = rng.uniform(0.2, 4.0), rng.uniform(0.15, 0.8), rng.uniform(0.2, 0.55)
+        path = Path.standing(*_around(rng, 1.2, 5.0))
+        builder.bodies.append(Body(kinds.OTHER, size, path, block(size, Material.WOOD), "low thing"))
+    enclose(builder, (18.0, 18.0), 3.0)
+    return _level(builder, Material.PAVING, height_m)
+
+
 def _around(rng: Generator, nearest_m: float, farthest_m: float) -> tuple[float, float, float]:
     """Place x, y [m] and heading [rad], at a random distance from the origin in any direction."""
     distance = rng.uniform(nearest_m, farthest_m)

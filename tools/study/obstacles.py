@@ -36,7 +36,7 @@ from tools.options import parser
 from tools.study.drives import add_options, steps_of
 from tools.study.mounts import of_mount
 
-PLACES = ("wall", "carpark", "grass", "hedges", "hills", "heaps", "stairs", "movers", "lying")
+PLACES = ("wall", "carpark", "grass", "hedges", "hills", "heaps", "stairs", "movers", "lying", "clutter")
 SMALL_M = 0.5
 """Greatest side of a small actor."""
 LEAST_POINTS = {False: 20, True: 5}

@@ -26,7 +26,7 @@ typedef struct {
     float max_rise_beside;
     float min_height_m, max_height_m, min_sqrt_range, max_sqrt_range; /* of the points that are used, exclusive */
     const i32 *low_sectors SHAPE(near_rings); /* sectors to the left and right that a low thing does not reach */
-    i32 near_rings, quarters, n_gaps;
+    i32 near_rings, rings_behind, quarters, n_gaps;
     const float *gaps SHAPE(n_gaps, 4); /* of dead beams: tangents of the elevations of gaps.py */
     float low_m, clear_m, foot_share, min_foot_m;
 } Ground;
@@ -245,10 +245,11 @@ static void close_round(const void *row, i64 step, i64 size, void *round)
  * is hidden, if it does not. */
 typedef enum { MAY_JOIN = 1, MAY_HIDE = 2 } Beside;
 
-/* The first half of Rays.advance for one ring, behind which are the ends `behind`: cells that continue the ground of their own rays, and cells in which
- * something stands. Height and range of the ground cell before the ring are left in `surface` and `range_before`,
- * the height of cells that are surely ground in `sure`. Something stands in a cell if its highest return lies flat_m
- * above the lowest, and more on ground that rises. */
+/* The first half of Rays.advance for one ring, behind which are the ends `behind`: cells that continue the ground of
+ * their own rays, and cells in which something stands. `surface` holds the lowest return behind each cell.
+ * Height and range of the ground cell before the ring are left in it and in `range_before`, the height of cells that
+ * are surely ground in `sure`. Something stands in a cell if its highest return lies flat_m above the lowest, and more
+ * on ground that rises. */
 static void follow_rays(const Ground *g, i32 ring, float (*restrict ends)[2], float (*restrict behind)[2],
                         float *restrict lowest, uint8_t *restrict kind, const float *restrict height,
                         const float *restrict range, const float *restrict slope, const float *restrict rise_range_m,
@@ -263,7 +264,9 @@ static void follow_rays(const Ground *g, i32 ring, float (*restrict ends)[2], fl
         float residual = lowest[k] - height[k] - slope[k] * minf(gap, c.max_gap_m);
         float max_spread_m = flat_m + maxf(slope[k], 0.0f) * depth_m;
         int is_flat = -ends[k][1] - lowest[k] <= max_spread_m;
-        int may_rise = is_flat & ((-behind[k][1] - lowest[k] <= max_spread_m) | (range[k] > 0.0f));
+        int is_flat_behind = -behind[k][1] - lowest[k] <= max_spread_m;
+        int stays_up = (surface[k] > lowest[k] - c.noise_m) & (surface[k] < INFINITY);
+        int may_rise = is_flat & ((is_flat_behind & stays_up) | (range[k] > 0.0f));
         float bound = minf(gap, rise_range_m[k]) * c.max_slope * (may_rise ? 1.0f : 0.0f) + c.noise_m;
         int may_fall = residual > -(gap * c.max_slope + c.noise_m);
         int is_below = residual < -c.noise_m;
@@ -301,6 +304,21 @@ static void join_rays(const Ground *g, i32 ring, const float *restrict beside, c
     }
 }
 
+/* GroundEstimator._lowest_behind, in `surface`. */
+static void look_behind(const Ground *g, const GroundScratch *s)
+{
+    i32 sectors = g->sectors, near_end = g->near_rings * sectors, end = g->rings * sectors;
+    for (i32 row = 0; row < end; row += sectors) {
+        float *restrict lowest = s->surface + row;
+        i32 last = row + g->rings_behind * sectors;
+        for (i32 k = 0; k < sectors; k++)
+            lowest[k] = INFINITY;
+        for (i32 behind = row + sectors; behind <= last && behind < near_end; behind += sectors)
+            for (i32 k = 0; k < sectors; k++)
+                lowest[k] = minf(s->ends[behind + k][0], lowest[k]);
+    }
+}
+
 /* GroundEstimator.trace. */
 static void trace(const Ground *g, float height_m, const GroundScratch *s)
 {
@@ -308,6 +326,7 @@ static void trace(const Ground *g, float height_m, const GroundScratch *s)
     float *height = s->rays, *range = height + sectors, *slope = range + sectors, *rise_range_m = slope + sectors;
     float *sure = rise_range_m + sectors, *beside = sure + sectors;
     float near_m = g->near_m, max_gap_m = g->max_gap_m;
+    look_behind(g, s);
     for (i32 k = 0; k < sectors; k++) {
         height[k] = -height_m;
         range[k] = 0.0f;

@@ -81,10 +81,11 @@ class GroundEstimator:
     The lowest return of a cell is ground if it continues the ground of its ray. It may rise by `max_slope_deg` more
     than the running slope of the ray over a short way, on and beside a ramp over a longer one. It may not rise more
     where something stands in the cell or, far away or on a ray that has met no ground yet, right behind it, since it
-    may be a flank or a bumper. It may fall by `max_slope_deg` more over any gap, since only ground lies lower. A ray
-    that has lost the ground finds it again in a cell where nothing stands, if that is as high as ground on a ray
-    beside it. The surface is linear between the ground returns of a ray; beyond its last one, the ground is level,
-    but a ramp goes on for `max_gap_m`.
+    may be a flank or a bumper. Nor may it rise on such a ray unless it goes on: where no return is right behind, or
+    one that lies lower again, the cell may be the side or the top of something low. The ground may fall by
+    `max_slope_deg` more over any gap, since only ground lies lower. A ray that has lost the ground finds it again in
+    a cell where nothing stands, if that is as high as ground on a ray beside it. The surface is linear between the
+    ground returns of a ray; beyond its last one, the ground is level, but a ramp goes on for `max_gap_m`.
 
     Behind a crest or an edge, the foot of what stands there is hidden. Where something stands more than `near_m` from
     the last ground, and the lowest return of its cell is below the line of the ray, the ground is taken to be
@@ -242,12 +243,24 @@ class GroundEstimator:
         """
         rays = Rays(self, lowest.copy(), sensor_height_m)
         range_m = self.range_m(lowest, np.arange(self.grid.rings)[:, None])
+        lowest_behind = self._lowest_behind(lowest)
+        # Where ground rises and goes on, what lies behind is not lower than this cell.
+        goes_on = np.isfinite(lowest_behind) & (lowest_behind > lowest - self.tuning.noise_m)
         for ring in range(self.grid.rings):
             flat_m = self.flat_m[ring] + np.maximum(rays.slope, 0) * self.depth_m[ring]
             behind = min(ring + 1, self.grid.rings - 1)
             flat, flat_behind = (top[at] - lowest[ring] <= flat_m for at in (ring, behind))
-            rays.advance(ring, range_m[ring], flat, flat_behind)
+            rays.advance(ring, range_m[ring], flat, flat_behind & goes_on[ring])
         return rays
+
+    def _lowest_behind(self, lowest: Float32) -> Float32:
+        """(rings, SECTORS) lowest return of the near cells right behind each on its ray [m], infinite without any."""
+        lowest_behind = np.full_like(lowest, np.inf)
+        near = lowest[: self.near_rings]
+        for step in range(1, min(self.tuning.rings_behind, self.near_rings - 1) + 1):
+            here = lowest_behind[: self.near_rings - step]
+            np.minimum(here, near[step:], out=here)
+        return lowest_behind
 
     def _interpolate(self, lowest: Float32, is_ground: Bool, slope: Float32, sensor_height_m: float) -> Float32:
         """(rings, SECTORS) surface at the inner edges of the rings, linear between the ground returns of a ray.
@@ -304,14 +317,14 @@ class Rays:
         """(SECTORS,) slope at the last ground cell of each ray that ends on a ramp, else 0."""
         return self.slope * self.on_ramp
 
-    def advance(self, ring: int, range_m: Float32, flat: Bool, flat_behind: Bool) -> None:
+    def advance(self, ring: int, range_m: Float32, flat: Bool, goes_on: Bool) -> None:
         """Find the rays that have ground in the next ring.
 
         Args:
             ring: that ring.
             range_m: (SECTORS,) range of the lowest returns [m].
             flat: (SECTORS,) cells in which nothing stands: the ground does not rise in the others.
-            flat_behind: (SECTORS,) cells right behind which nothing stands.
+            goes_on: (SECTORS,) cells behind which nothing stands, and the ground goes on.
         """
         tuning = self.ground.tuning
         lowest = self.lowest[ring]
@@ -319,9 +332,9 @@ class Rays:
         # How far each return is from the line that its ray was on, extrapolated no farther than max_gap_m.
         gap = range_m - self.range_m
         residual = lowest - self.height_m - self.slope * np.minimum(gap, tuning.max_gap_m)
-        # It continues its own ray. Before a ray has met any ground, the cell right behind has to be flat as well.
+        # It continues its own ray. Before a ray has met any ground, a rise has to go on behind as well.
         rise_range_m = np.where(self.beside_ramp, np.float32(tuning.max_gap_m), np.float32(tuning.near_m))
-        may_rise = flat & (flat_behind | (self.range_m > 0))
+        may_rise = flat & (goes_on | (self.range_m > 0))
         found: Bool = residual < np.minimum(gap, rise_range_m) * max_slope * may_rise + tuning.noise_m
         may_fall = residual > -(gap * max_slope + tuning.noise_m)
         found &= may_fall

@@ -75,6 +75,10 @@ class GroundTuning:
     """Sectors to the left and right of a ray whose median bounds its surface. Chosen on: KITTI scans."""
     flank_m: float = 0.25
     """Height above that median from which a surface is the side of a vehicle [m]. Chosen on: KITTI scans."""
+    rings_behind: int = 8
+    """Rings behind a cell in which a rise goes on, or comes down again, on a ray that has met no ground before. Less
+    takes low things nearer than all visible ground for ground, more takes hills for things.
+    Chosen on: simulated clutter and hills."""
     low_m: float = 0.08
     """Height above the median of the surface beside it from which a surface is the top of a low thing [m].
     More takes people who lie for ground. Chosen on: simulated halls."""
