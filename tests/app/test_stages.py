@@ -391,6 +391,15 @@ def test_a_head_at_twice_the_speed_of_a_named_profile_has_returns_twice_as_far_a
     assert ("2 times the speed of profile vlp-16" in caplog.text) == (every == 2)
 
 
+def test_a_head_at_twice_the_speed_of_the_profile_that_its_source_names_keeps_it():
+    frame = frames()[0]
+    column = np.rint(np.rad2deg(np.arctan2(frame.points[:, 1], frame.points[:, 0])) / 0.2).astype(int)
+    faster = dataclasses.replace(frame, points=frame.points[column % 2 == 0])
+    chosen = choose(profile.resolve(), faster, dataclasses.replace(INFO, profile="vlp-16"))
+    assert chosen.sensor == "vlp-16"
+    assert chosen.config.sensor.azimuth_step_deg == pytest.approx(0.4)
+
+
 def test_a_displaced_sensor_keeps_its_profile_until_it_is_back(monkeypatch):
     stages = stages_of()
     frame = frames()[0]

@@ -72,8 +72,12 @@ def choose(requested: Resolved | ProfileConfig, first: Frame | None, info: Strea
         recognition = _compared(first, config, requested.sensor, replaced=False)
         return ChosenProfile(recognition.mounted(config), requested.sensor, requested.used(""), recognition)
     base = info.profile if info and info.profile else profile.DEFAULT
-    name = base if info and info.profile else f"{base} (the default)"
-    recognition = _compared(first, _with_beams(requested.applied_to(profile.load(base)), info), name, replaced=True)
+    name = f"{base} (the default)"
+    config = _with_beams(requested.applied_to(profile.load(base)), info)
+    if info and info.profile:
+        name = base
+        config = _at_speed_of(first, config, base)
+    recognition = _compared(first, config, name, replaced=True)
     sensor = FOUND if recognition.differences else base
     config = _with_beams(requested.applied_to(recognition.fitted), info)
     return ChosenProfile(config, sensor, requested.used(sensor), recognition)

@@ -31,7 +31,9 @@ MAX_SPACING_RATIO = 1.35
 MAX_AZIMUTH_RATIO = 1.6
 """Greatest ratio of the spacings along a beam: a head may turn faster."""
 CLEAR_CONTRAST = 0.98
-"""Contrast of the beams below which a sweep may be twisted by roll and pitch during it."""
+"""Contrast of the beams below which a sweep may be twisted by roll and pitch, or bent by a drive, during it."""
+N_SECTORS = 8
+"""Number of sectors in which the beams of such a sweep are looked for."""
 MIN_TWIST = np.deg2rad(1.0)
 """Least change of the slope of a floor during a sweep that is undone."""
 FLOOR_SAMPLE = 4000
@@ -122,9 +124,25 @@ def recognise(points: Float32, config: ProfileConfig) -> Recognition:
 def _pattern(points: Float32) -> BeamPattern | None:
     """Beams of (N, 4) points; None if they are too few."""
     pattern = find_beams([points], COARSE_ORIGINS_M)
-    if pattern is not None and pattern.contrast < CLEAR_CONTRAST:
-        return _untwisted_pattern(points) or pattern
-    return pattern
+    if pattern is None or pattern.contrast >= CLEAR_CONTRAST:
+        return pattern
+    untwisted_pattern = _untwisted_pattern(points)
+    if untwisted_pattern is not None and untwisted_pattern.contrast > pattern.contrast:
+        return untwisted_pattern
+    return _pattern_of_sectors(points) or pattern
+
+
+def _pattern_of_sectors(points: Float32) -> BeamPattern | None:
+    """Beams of (N, 4) points in the sector of median spacing; None if few sectors show beams clearly.
+
+    Compensation for a drive shifts the beams of each bearing by another angle, which blurs them in the whole sweep.
+    """
+    sector = ((np.arctan2(points[:, 1], points[:, 0]) / np.pi + 1) * (N_SECTORS / 2)).astype(np.int64) % N_SECTORS
+    patterns = [find_beams([points[sector == i]], COARSE_ORIGINS_M[:1]) for i in range(N_SECTORS)]
+    clear = [pattern for pattern in patterns if pattern is not None and pattern.contrast >= CLEAR_CONTRAST]
+    if len(clear) < N_SECTORS / 2:
+        return None
+    return sorted(clear, key=lambda pattern: pattern.spacing_deg)[len(clear) // 2]
 
 
 def _untwisted_pattern(points: Float32) -> BeamPattern | None:
