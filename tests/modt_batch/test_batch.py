@@ -12,6 +12,7 @@ pytest.importorskip("pyarrow")
 pytest.importorskip("distributed")
 
 import fsspec
+import numpy as np
 from pyarrow import dataset as arrow
 from pyarrow import parquet
 
@@ -22,6 +23,7 @@ from modt_batch.report import mean, worst_first
 from modt_simulation.synthetic_stream import SyntheticStream
 from tests import recorded
 from tests.cli.commands import environment, here, modt, refusal
+from tests.sources.datasets import Sweep, write_nuscenes
 
 pytestmark = pytest.mark.slow
 HERE = Path(__file__).parent
@@ -144,6 +146,22 @@ def test_arrow_and_duckdb_read_the_dataset_as_one_table_each(whole):
     assert len(duckdb.sql(joined).fetchall()) == 16
 
 
+@pytest.mark.parametrize(("place", "names"), [("", ("0001", "0002", "0103")), ("scene-00*", ("0001", "0002"))])
+def test_a_data_set_of_nuscenes_stands_for_its_scenes(place, names, tmp_path, capsys):
+    root = write_nuscenes(tmp_path / "data", {f"scene-{n}": [sweep_of_dots()] for n in ("0103", "0002", "0001")})
+    assert here("batch", root / place, "--out", tmp_path / "out", "--jobs", 1, "--pages", 0, "--quiet") == 0
+    runs = arrow.dataset(tmp_path / "out" / "runs").to_table(columns=["stream"])
+    assert sorted(runs["stream"].to_pylist()) == [f"scene-{n}" for n in names]
+    assert "no scene scene-9*; give one of scene-0001, " in refusal(
+        capsys, "batch", root / "scene-9*", "--out", tmp_path / "out"
+    )
+
+
+def sweep_of_dots():
+    dots = np.random.default_rng(0).uniform(-20, 20, (60, 4)).astype(np.float32)
+    return Sweep(0, dots * (1, 1, 1, 0))
+
+
 def test_addresses_of_fsspec_are_recordings_and_datasets(drives, whole):
     files = fsspec.filesystem("memory")
     for drive in drives:
@@ -192,8 +210,10 @@ def test_a_page_and_a_report_lead_from_the_figures_to_the_worst_run(drives, tmp_
 
 
 def test_means_have_intervals_over_the_recordings():
-    found = mean([1.0, 2.0, 3.0])
-    assert (found.value, round(found.low, 3), round(found.high, 3)) == (2.0, -0.484, 4.484)
+    found = mean([2.0, 3.0, 4.0])
+    assert (found.value, round(found.low, 3), round(found.high, 3)) == (3.0, 0.516, 5.484)
+    assert mean([1.0, 2.0, 3.0]).low == 0.0
+    assert mean([90.0, 99.0, 100.0], "%").high == 100.0
     assert mean([1.0]).low is None
     assert mean([None, float("nan")]).value is None
 

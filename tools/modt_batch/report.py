@@ -83,13 +83,17 @@ def trusted_percent(row: Row) -> float:
 
 
 def mean(values: Sequence[float | None], unit: str = "", kind: Kind = Kind.MEASURED) -> Quantity:
-    """Mean over recordings, with its 95 % interval by Student's distribution where there are two or more."""
+    """Mean over recordings, with its 95 % interval by Student's distribution where there are two or more.
+
+    No figure is below 0 or above 100 %, so the interval ends there.
+    """
     known = np.array([value for value in values if value is not None and np.isfinite(value)], float)
     if len(known) < 2:
         return quantity(float(known[0]) if len(known) else None, unit, kind)
     middle = float(known.mean())
     half = float(student_t.ppf(0.975, len(known) - 1) * known.std(ddof=1) / np.sqrt(len(known)))
-    return quantity(middle, unit, kind, (middle - half, middle + half))
+    most = 100.0 if unit == "%" else np.inf
+    return quantity(middle, unit, kind, (max(middle - half, 0.0), min(middle + half, most)))
 
 
 def _figures(by_mode: Mapping[str, Sequence[Row]]) -> Table:

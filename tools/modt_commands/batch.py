@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import fnmatch
 import os
 import sys
 from collections.abc import Sequence
@@ -103,7 +104,8 @@ def _absolute(place: str) -> str:
 
 
 def _recordings(places: Sequence[str], *, local: bool) -> list[str]:
-    """Addresses of the recordings, each once. A remote address with * stands for all that it matches.
+    """Addresses of the recordings, each once. A remote address with * stands for all that it matches, as does a
+    data set of nuScenes for its scenes.
 
     Raises:
         MisuseError: a path is missing, or nothing matches an address.
@@ -119,11 +121,33 @@ def _recordings(places: Sequence[str], *, local: bool) -> list[str]:
             found += [files.unstrip_protocol(match) for match in matches]
             if not matches:
                 raise MisuseError(place, "matches nothing", "give the address of recordings")
-        elif local and "://" not in address and not Path(address).exists():
+        elif "://" in address or "::" in address:
+            found.append(address)
+        elif scenes := _scenes(Path(address)):
+            found += scenes
+        elif local and not Path(address).exists():
             raise MisuseError(place, "does not exist", "give the path of a recording")
         else:
             found.append(address)
     return list(dict.fromkeys(found))
+
+
+def _scenes(path: Path) -> list[str]:
+    """Paths of the scenes of nuScenes at DATA, or at DATA/PATTERN, which no folder need have; [] without its tables.
+
+    Raises:
+        MisuseError: no scene matches, or the tables cannot be read.
+    """
+    from modt.sources.nuscenes import read_table, tables_of
+
+    if (found := tables_of(path)) is None:
+        return []
+    tables, pattern = found
+    names = sorted(row["name"] for row in read_table(tables, "scene", "name"))
+    matches = fnmatch.filter(names, pattern or "*")
+    if not matches:
+        raise MisuseError(path, f"no scene {pattern}", f"give one of {', '.join(names[:10])}")
+    return [str((path.parent if pattern else path) / name) for name in matches]
 
 
 def _in_mode(request: Any, mode: str) -> Any:
