@@ -31,6 +31,30 @@ def test_two_topics_of_a_recording_are_one_stream_with_the_poses_of_the_robot(tm
         stream(Request(path=bags.write_rosbag2(tmp_path / "other", front), profile=[written(tmp_path)]))
 
 
+def test_a_recording_of_two_sensors_is_played_as_if_they_were_live(tmp_path):
+    front = bags.clouds(topic="/front/points")
+    rear = bags.clouds(topic="/rear/points")
+    bag = bags.write_rosbag2(tmp_path / "bag", bags.by_time(front, rear))
+    source, path = live_source(str(bag), None, [written(tmp_path)])
+    assert path is None
+    assert source.info.name.startswith("front, rear of ")
+    source.start()
+    try:
+        received = next(filter(None, (source.take(1.0) for _ in range(60))))
+    finally:
+        source.close()
+    assert len(received.frame.sweeps) == 2
+    folders = {name: {**keys, "source": str(bag)} for name, keys in ROBOT.items()}
+    with pytest.raises(MisuseError, match="choose by"):
+        live_source("", None, [written(tmp_path, folders)])
+
+
+def test_a_sensor_that_a_recording_lacks_is_named_with_what_to_do(tmp_path):
+    bag = bags.write_rosbag2(tmp_path / "bag", bags.clouds(topic="/front/points"))
+    with pytest.raises(MisuseError, match="or leave sensor rear out of the profile"):
+        stream(Request(path=bag, profile=[written(tmp_path)]))
+
+
 def test_a_profile_of_several_sensors_is_based_on_the_first_and_says_so_again(tmp_path):
     path = written(tmp_path, tracking={"max_missed": 5})
     config = profile.load(path)

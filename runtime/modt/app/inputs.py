@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl
 
 from modt import profile
-from modt.config import OdometryConfig, ProfileConfig
+from modt.config import MountedSensor, OdometryConfig, ProfileConfig
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
 from modt.placement import LEVEL, Mount
@@ -97,25 +97,50 @@ def live_source(
         MisuseError: no such sensor or recording.
     """
     config = profile.load(names)
-    if config.sensors and not text:
+    if config.sensors:
         from modt.sources.live.joint_live import JointLive
 
-        return JointLive(config.sensors, [open_sensor(sensor.source, cores) for sensor in config.sensors]), None
+        return JointLive(config.sensors, live_sensors(config.sensors, text, cores)), None
     if "://" in text:
-        if config.sensors:
-            raise MisuseError(text, "is one sensor, and the profile has several", "leave it out, or the profile")
         return open_sensor(text, cores), None
     from modt.sources.live.live_stream import LiveStream, PlayedReader
 
+    path, loop = _recording(text)
+    recording = stream(Request(path=path), config)
+    return LiveStream(recording.info, PlayedReader(recording, loop=loop), cores=cores), None if loop else path
+
+
+def live_sensors(sensors: Sequence[MountedSensor], text: str, cores: frozenset[int] | None) -> list[LiveStream]:
+    """The sensors of a robot, live, or in recordings that are played as if they were live.
+
+    They are in the recording at a path, or for "" where their `source` says.
+
+    Raises:
+        MisuseError: as `live_source`.
+    """
+    if not text and not all(sensor.source and "://" not in sensor.source for sensor in sensors):
+        return [open_sensor(sensor.source, cores) for sensor in sensors]
+    if "://" in text:
+        raise MisuseError(text, "is one sensor, and the profile has several", "leave it out, or the profile")
+    from modt.app.recorded_sensors import open_recorded
+    from modt.sources.live.live_stream import LiveStream, PlayedReader, PlayedSince
+
+    path, loop = _recording(text)
+    recorded = [open_recorded(sensor, path, profile.load([sensor.profile]).sensor.period_s) for sensor in sensors]
+    began_s = min(part.info.began_s for part in recorded)
+    since = PlayedSince()
+    readers = [PlayedReader(part, loop=loop, later_s=part.info.began_s - began_s, since=since) for part in recorded]
+    return [LiveStream(part.info, reader, cores=cores) for part, reader in zip(recorded, readers, strict=True)]
+
+
+def _recording(text: str) -> tuple[Path | None, bool]:
+    """Path of PATH?loop=yes, None for "", and whether the recording is played for ever."""
     place, _, query = text.partition("?")
     options = dict(parse_qsl(query, keep_blank_values=True))
     loop = options.pop("loop", "no")
     if options or loop not in ("yes", "no"):
         raise MisuseError(text, f"option {query!r} is unknown", "write PATH or PATH?loop=yes")
-    path = Path(place) if place else None
-    recording = stream(Request(path=path), config)
-    reader = PlayedReader(recording, loop=loop == "yes")
-    return LiveStream(recording.info, reader, cores=cores), None if loop == "yes" else path
+    return Path(place) if place else None, loop == "yes"
 
 
 def odometry(request: Request, info: StreamInfo, config: OdometryConfig) -> PoseSource:

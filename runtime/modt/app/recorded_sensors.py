@@ -25,11 +25,23 @@ def open_recordings(sensors: Sequence[MountedSensor], path: Path | None, period_
     Raises:
         MisuseError: a sensor has no recording there.
     """
-    return JointStream(sensors, [_open(sensor, path, period_s) for sensor in sensors])
+    return JointStream(sensors, [open_recorded(sensor, path, period_s) for sensor in sensors])
+
+
+def open_recorded(sensor: MountedSensor, path: Path | None, period_s: float) -> Stream:
+    """The recorded stream of a sensor; arguments as in `open_recordings`.
+
+    Raises:
+        MisuseError: it has no recording there.
+    """
+    try:
+        return _open(sensor, path, period_s)
+    except MisuseError as error:
+        remedy = f"{error.remedy}; or leave sensor {sensor.name} out of the profile"
+        raise MisuseError(error.subject, error.cause, remedy) from None
 
 
 def _open(sensor: MountedSensor, path: Path | None, period_s: float) -> Stream:
-    """The recorded stream of a sensor."""
     if path is None:
         if not sensor.source or "://" in sensor.source:
             remedy = "give the path of a recording, or modt run for live sensors"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from functools import partial
 
 from modt import host
@@ -19,6 +20,7 @@ def add_parser(commands: options.Commands) -> None:
         p,
         "modt check                                this machine, with the default profile",
         "modt check velodyne:// --profile vlp-16   and whether that sensor sends",
+        "modt check --profile robot.yaml           and whether each sensor of a robot sends",
     )
     p.set_defaults(run=run)
 
@@ -30,9 +32,8 @@ def run(arguments: argparse.Namespace) -> int:
     # NumPy is imported from here on, after the process is pinned.
     from modt import profile
     from modt.app import assembly, checks
-    from modt.app.inputs import live_source
+    from modt.app.inputs import live_sensors, live_source
     from modt.energy.meters.discovery import discover
-    from modt.schemes import open_sensor
 
     config = profile.load(arguments.profile)
     limits = config.classification
@@ -47,11 +48,12 @@ def run(arguments: argparse.Namespace) -> int:
         checks.disk(arguments.out, config),
         checks.clock(),
     ]
-    if arguments.source is not None:
+    if arguments.source is not None and not config.sensors:
         found += checks.sensor(lambda: live_source(arguments.source, cores)[0], config=config)
     for mounted in config.sensors:
-        opened = partial(open_sensor, mounted.source, cores)
-        found += checks.sensor(opened, config=assembly.sensor_profile(mounted))
+        opened = partial(lambda sensor: live_sensors([sensor], arguments.source or "", cores)[0], mounted)
+        of_sensor = checks.sensor(opened, config=assembly.sensor_profile(mounted))
+        found += [replace(finding, subject=f"{mounted.name} {finding.subject}") for finding in of_sensor]
     for finding in found:
         print(finding)
     return int(any(finding.level == checks.FAIL for finding in found))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from modt.sources.live.live_stream import PlayedReader
+from modt.sources.live.live_stream import PlayedReader, PlayedSince
 from modt.sources.stream import Faults, Reading, StreamEndedError, StreamInfo
 from modt.types import Frame
 
@@ -42,6 +42,14 @@ def test_sweeps_come_at_the_pace_of_their_stamps():
     assert out == [(0.0, 7.0, 0), (0.1, 7.1, 1), (1.5, 8.5, 2)]
     with pytest.raises(StreamEndedError):
         reader.read(0.2)
+
+
+def test_recordings_that_are_played_together_keep_the_time_between_them():
+    since = PlayedSince()
+    before, _ = played([0.0, 0.1], 2, since=since)
+    after, _ = played([0.0, 0.1], 2, later_s=0.5, since=since)
+    assert [due_s for due_s, *_ in before + after] == [0.0, 0.1, 0.5, 0.6]
+    assert [stamp_s for _, stamp_s, _ in after] == [0.5, 0.6]
 
 
 def test_a_loop_goes_on_with_rising_stamps():

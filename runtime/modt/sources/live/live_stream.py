@@ -297,12 +297,25 @@ class LiveStream:
         return ""
 
 
+@dataclass(slots=True)
+class PlayedSince:
+    """When recordings that are played together begin.
+
+    Attributes:
+        start_s: time at which stamp 0 is due, by their clock [s]; None until one of them is read.
+    """
+
+    start_s: float | None = None
+
+
 class PlayedReader:
     """Sweeps of a stream at the pace of their stamps, without their poses.
 
     Args:
         stream: the recording.
         loop: start over at its end, with stamps that go on.
+        later_s: time by which it begins after others with the same `since` [s]; it is added to the stamps.
+        since: shared by recordings that are played together; the first that is read sets it.
         clock: monotonic clock [s].
         wait: waits for a time [s]; returns True, possibly earlier, if the reader is closed.
     """
@@ -314,6 +327,8 @@ class PlayedReader:
         stream: Stream,
         *,
         loop: bool = False,
+        later_s: float = 0.0,
+        since: PlayedSince | None = None,
         clock: Callable[[], float] = time.monotonic,
         wait: Callable[[float], bool] | None = None,
     ) -> None:
@@ -325,18 +340,20 @@ class PlayedReader:
         self._wait = wait or self._closed.wait
         self._frames = _repeated(stream) if loop else ((frame.stamp_s, frame) for frame in stream)
         self._next: tuple[float, Frame] | None = None  # read before it is due
-        self._start_s: float | None = None  # time of stamp 0 by the clock
+        self._later_s = later_s
+        self._since = since or PlayedSince()
 
     def read(self, timeout_s: float) -> Sequence[Sweep]:
         """Next sweep, if it is due within the timeout."""
         self._next = self._next or next(self._frames, None)
         if self._next is None or self._closed.is_set():
             raise StreamEndedError
-        stamp_s, frame = self._next
+        played_s, frame = self._next
+        stamp_s = played_s + self._later_s
         now_s = self._clock()
-        if self._start_s is None:
-            self._start_s = now_s - stamp_s
-        due_s = self._start_s + stamp_s - now_s
+        if self._since.start_s is None:
+            self._since.start_s = now_s - stamp_s
+        due_s = self._since.start_s + stamp_s - now_s
         if due_s > 0 and (self._wait(min(due_s, timeout_s)) or due_s > timeout_s):
             return ()
         self._next = None
