@@ -95,6 +95,14 @@ def test_waiting_ends_at_the_timeout_without_a_frame(pair):
     assert pair.now_s == pytest.approx(0.2)
 
 
+def test_each_silent_sensor_is_logged_by_its_name(pair, caplog):
+    for _ in range(25):
+        assert pair.source.take(0.1) is None
+    named = [record.getMessage().partition(" of ")[0] for record in caplog.records if "no sweep" in record.msg]
+    assert named == [stream.name.partition(" of ")[0] for stream in pair.streams]
+    assert len(set(named)) == 2
+
+
 def test_clocks_that_differ_are_named_and_sweeps_joined_by_their_arrival(pair, caplog):
     for k in range(5):
         pair.send(0, 100 + k * PERIOD_S, k * PERIOD_S)

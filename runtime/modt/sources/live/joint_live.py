@@ -64,7 +64,8 @@ class JointLive:
         self._wait = wait or self._wait_for_arrival
         self._arrived = threading.Condition()
         self.faults = Faults()
-        for stream in streams:
+        for sensor, stream in zip(sensors, streams, strict=True):
+            stream.name = f"{sensor.name} of {stream.info.name}"
             stream.arrived = self._arrived
             stream.faults = self.faults
         self._joiner = SweepJoiner(len(streams), tolerance_s([stream.info for stream in streams]))
