@@ -131,6 +131,15 @@ def test_a_recording_that_fails_leaves_the_others_and_is_tried_again(drives, who
     assert len(Dataset(str(out)).committed()) == 8
 
 
+def test_warnings_name_their_run_and_are_not_repeated_for_its_page(tmp_path, capsys):
+    drive = recorded.scans(tmp_path / "drive", SyntheticStream("street", "vlp-16", 0.3, 1))
+    first = min(drive.rglob("*.bin"))
+    first.write_bytes(first.read_bytes()[:-1])
+    assert here("batch", drive, "--out", tmp_path / "out", "--jobs", 1, "--pages", 1, "--quiet") == 0
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if "frame skipped" in line]
+    assert line.startswith("modt: drive-")
+
+
 def test_arrow_and_duckdb_read_the_dataset_as_one_table_each(whole):
     duckdb = pytest.importorskip("duckdb")
     for table in TABLES:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import hashlib
 import json
+import logging
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -80,7 +81,7 @@ def process(task: Task) -> str:
     """
     dataset = Dataset(task.dataset)
     if task.name not in dataset.committed():
-        with replayed(task) as run:
+        with logged(task.name, logging.WARNING), replayed(task) as run:
             names = {"run": task.name, "recording": task.recording, "mode": task.request.mode}
             files = {table: run / f"{table}.parquet" for table in ("tracks", "ledger", RUNS)}
             write_parquet(Export(RunRecord.open(run)), files["tracks"], names)
@@ -100,9 +101,24 @@ def write_page(task: Task) -> None:
     """
     from modt_viewer.view import save_view
 
-    with replayed(task) as run:
+    with logged(task.name, logging.ERROR), replayed(task) as run:  # the first replay has logged the warnings
         save_view(run, None, None, task.request.capture, run / "view.html")
         Dataset(task.dataset).put(task.page, (run / "view.html").read_bytes())
+
+
+@contextmanager
+def logged(name: str, level: int) -> Iterator[None]:
+    """Context in which lines of the log from a level on begin with a name."""
+    handler = logging.StreamHandler()
+    handler.setLevel(level)
+    handler.setFormatter(logging.Formatter(f"modt: {name}: %(message)s"))
+    root = logging.getLogger()
+    before = root.handlers[:]
+    root.handlers[:] = [handler]
+    try:
+        yield
+    finally:
+        root.handlers[:] = before
 
 
 @contextmanager

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from shlex import quote
 
 from modt.cli import options
 from modt.errors import MisuseError, ModtError
@@ -15,7 +16,7 @@ MOST_FRAMES = 1000
 def add_parser(commands: options.Commands) -> None:
     """Declare the command and its options."""
     p = commands.add_parser("fit", help="fit a profile to a recording of an unknown sensor")
-    stream = "KITTI drive, sequence, folder of .bin, .pcd or .ply scans, or PCAP file; best of a drive that moves"
+    stream = "a recording, as for modt replay; best of a drive that moves"
     p.add_argument("path", type=Path, metavar="RECORDING", help=stream)
     options.add(p, "capture")
     p.add_argument("--name", metavar="NAME", help="name of the profile (default: that of the recording)")
@@ -54,5 +55,5 @@ def run(arguments: argparse.Namespace) -> int:
     print(text)
     for doubt in doubts(findings):
         print(f"  to be checked: {doubt}")
-    print(f"  written to {out}; use it as --profile {out}")
+    print(f"  written to {out}; use it as --profile {quote(str(out))}")
     return 0

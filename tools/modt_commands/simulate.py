@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 from modt.cli import options
@@ -63,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
         return _simulate_robot(out, arguments)
     writer = _written(out, arguments, arguments.sensor)
     print(f"KITTI raw drive: {writer.drive}\nSemanticKITTI sequence: {writer.sequence}")
-    print(f"next: modt replay {writer.drive} --profile {arguments.sensor}")
+    print(f"next: modt replay {quote(str(writer.drive))} --profile {arguments.sensor}")
     return 0
 
 
@@ -89,7 +90,7 @@ def _simulate_robot(out: Path, arguments: argparse.Namespace) -> int:
     base = str(Path(arguments.profile).resolve())
     robot.write_text(profile.to_yaml({"extends": base, "sensors": sources}), encoding="utf-8")
     print(f"drives of {', '.join(sources)}, their profile: {robot}, and labels in the frame of the robot: {out}")
-    print(f"next: modt replay --profile {robot}")
+    print(f"next: modt replay --profile {quote(str(robot))}")
     return 0
 
 

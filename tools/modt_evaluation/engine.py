@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import logging
+import signal
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import partial
+from multiprocessing import resource_tracker
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -43,6 +45,9 @@ class Engine:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if kind is KeyboardInterrupt:  # Dask complains of what it was about to do
+            for name in ("distributed", "tornado"):
+                logging.getLogger(name).setLevel(logging.CRITICAL)
         self._open.close()
 
     @property
@@ -102,13 +107,27 @@ class Engine:
         address: Any = self.scheduler
         if self.scheduler is None:
             host.pin_to_core(None)  # the processes inherit the size of the thread pools
-            cluster = LocalCluster(n_workers=self.jobs, threads_per_worker=1, dashboard_address="127.0.0.1:0")
-            address = self._open.enter_context(cluster)
+            options = {"dashboard_address": "127.0.0.1:0", "silence_logs": logging.CRITICAL}
+            with _without_ctrl_c():
+                cluster = LocalCluster(n_workers=self.jobs, threads_per_worker=1, **options)
+                address = self._open.enter_context(cluster)
+            logging.getLogger("distributed").setLevel(logging.WARNING)  # which the cluster has set for its workers
         try:
             self._client = self._open.enter_context(Client(address, timeout=CONNECT_S))
         except (OSError, ValueError, TimeoutError) as error:
             raise ModtError(self.scheduler, f"no scheduler answers ({error})", "give the address it prints") from None
         self.announce(f"dashboard of the cluster: {self._client.dashboard_link}")
+
+
+@contextmanager
+def _without_ctrl_c() -> Iterator[None]:
+    """Context whose processes and threads get no SIGINT, so that this process alone ends them; it waits here."""
+    resource_tracker.ensure_running()  # which the first process would start, and which lets SIGINT through again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _outcome(function: Callable[[T], R], task: T) -> R | Exception:

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 import numpy as np
@@ -298,7 +299,7 @@ def _write_profile(request: Request, path: Path, found: dict[int, tuple[float, f
     settings = {"extends": names or [profile.DEFAULT], "classification": {"model": path.name}}
     made = path.with_suffix(".yaml")
     made.write_text(profile.to_yaml(settings), encoding="utf-8")
-    lines = [f"next: modt replay DRIVE --profile {made}"]
+    lines = [f"next: modt replay DRIVE --profile {quote(str(made))}"]
     if FILE is not None:
         table = request.out / "classes.json"
         rows = json.loads(Path(FILE).read_text(encoding="utf-8"))

@@ -101,7 +101,8 @@ def add_examples(p: Parser, *examples: str) -> None:
 def add_stream_options(p: Parser, first_frames: tuple[int, int | None] = (0, None)) -> None:
     """Add the options of a stream: path, capture, frames, profile and core."""
     stream = (
-        "KITTI drive, folder of .bin, .pcd or .ply scans, PCAP file, ROS 2 recording (default: a synthetic stream)"
+        "KITTI drive, scene of nuScenes, log of Argoverse 2, folder of .bin, .pcd or .ply scans, PCAP file, "
+        "ROS 2 recording (default: a synthetic stream)"
     )
     p.add_argument("path", nargs="?", type=Path, metavar="PATH", help=stream)
     add(p, "capture")

@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 from modt import host
@@ -98,4 +99,4 @@ def _say(lines: Sequence[str]) -> None:
 def _place(directory: RunDirectory) -> str:
     """Line about the place of the results."""
     kept = f"; those before are kept in {directory.previous}" if directory.previous else ""
-    return f"  results in {directory.path}; to look at them: modt view {directory.path}{kept}"
+    return f"  results in {directory.path}; to look at them: modt view {quote(str(directory.path))}{kept}"
