@@ -209,7 +209,7 @@ def test_bad_scans_are_counted_and_skipped_bad_points_are_counted_and_the_first_
         (lambda root: root / "nowhere", "no such file"),
         (lambda root: root, "no stream"),
         (lambda root: (root / "a.bin").write_bytes(b"") or root / "a.bin", "no stream"),
-        (lambda root: layouts.raw_drive(root).parent.parent, "several streams.*drive_9999"),
+        (lambda root: layouts.raw_drive(root).parent.parent, "a stream further down.*drive_9999"),
     ],
     ids=["missing", "empty", "a file", "a root"],
 )

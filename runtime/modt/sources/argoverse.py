@@ -110,7 +110,7 @@ def read_columns(path: Path, names: tuple[str, ...]) -> Columns:
     except ModuleNotFoundError as error:
         raise MisuseError(path, f"needs {error.name}", install("parquet")) from None
     try:
-        table = feather.read_table(path, columns=list(names), memory_map=False)
+        table = feather.read_table(path, columns=list(names), memory_map=False, use_threads=False)
         return {name: table.column(name).to_numpy() for name in names}
     except (OSError, ArrowException, KeyError) as error:
         raise MisuseError(

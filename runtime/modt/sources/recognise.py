@@ -104,7 +104,8 @@ def open_scans(path: Path, period_s: float = PERIOD_S) -> ScanStream:
     if nearby:
         more = f" (and {len(nearby) - MAX_LISTED} more)" if len(nearby) > MAX_LISTED else ""
         remedy = f"give one: {', '.join(map(str, nearby[:MAX_LISTED]))}{more}"
-        raise MisuseError(path, "holds several streams", remedy)
+        cause = "holds several streams" if len(nearby) > 1 else "holds a stream further down"
+        raise MisuseError(path, cause, remedy)
     raise MisuseError(path, "no stream of scans", REMEDY)
 
 
