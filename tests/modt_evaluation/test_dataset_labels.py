@@ -95,9 +95,8 @@ def cuboids(folder, name, frames=(0, 1), scans=(0, 1)):
 
 
 def test_an_unknown_name_is_an_error_with_those_that_are_known(tmp_path):
-    with pytest.raises(
-        MisuseError, match=r"label 'vehicle\.cart' is unknown; .*human\.pedestrian\.adult.*vehicle\.car,"
-    ):
+    names = r"human\.pedestrian\.adult.*vehicle\.car,"
+    with pytest.raises(MisuseError, match=rf"'vehicle\.cart' is unknown; did you mean 'vehicle\.car'\? .*{names}"):
         open_truth(cuboids(tmp_path, "vehicle.cart"))
     drive = layouts.raw_drive(tmp_path / "kitti")
     item = "<item><objectType>Boat</objectType><h>1</h><w>1</w><l>1</l><first_frame>0</first_frame><poses><item>"

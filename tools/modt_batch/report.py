@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import t as student_t
+from scipy.special import stdtrit
 
 from modt.energy.meters.meter import Kind
 from modt_batch.dataset import PAGES
@@ -91,7 +91,7 @@ def mean(values: Sequence[float | None], unit: str = "", kind: Kind = Kind.MEASU
     if len(known) < 2:
         return quantity(float(known[0]) if len(known) else None, unit, kind)
     middle = float(known.mean())
-    half = float(student_t.ppf(0.975, len(known) - 1) * known.std(ddof=1) / np.sqrt(len(known)))
+    half = float(stdtrit(len(known) - 1, 0.975) * known.std(ddof=1) / np.sqrt(len(known)))
     most = 100.0 if unit == "%" else np.inf
     return quantity(middle, unit, kind, (max(middle - half, 0.0), min(middle + half, most)))
 

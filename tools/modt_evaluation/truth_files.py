@@ -7,6 +7,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -218,8 +219,11 @@ def _frame(
     labels = list(labels)
     for label in labels:
         if label.type_ not in types and label.type_ not in KITTI_NAMES:
-            known = ", ".join(sorted({*types, *KITTI_NAMES} - {DONT_CARE}))
-            raise MisuseError(place, f"label {label.type_!r} is unknown", f"write one of these names: {known}")
+            known = sorted({*types, *KITTI_NAMES} - {DONT_CARE})
+            near = get_close_matches(label.type_, known, 1)
+            hint = f"did you mean {near[0]!r}? " if near else ""
+            remedy = f"{hint}write one of these names: {', '.join(known)}"
+            raise MisuseError(place, f"label {label.type_!r} is unknown", remedy)
     objects = [label for label in labels if label.type_ != DONT_CARE]
     edges = [label.image_box for label in labels if label.type_ == DONT_CARE]
     return FrameTruth.of(

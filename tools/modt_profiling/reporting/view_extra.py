@@ -54,5 +54,7 @@ def save(path: Path, page: Page) -> None:
     """
     with importing(path):
         from modt_profiling.reporting.html_page import html
+
+        text = html(page)  # plots need Matplotlib
     with writing(path):
-        path.write_text(html(page), encoding="utf-8")
+        path.write_text(text, encoding="utf-8")
