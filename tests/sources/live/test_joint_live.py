@@ -99,7 +99,7 @@ def test_each_silent_sensor_is_logged_by_its_name(pair, caplog):
     for _ in range(25):
         assert pair.source.take(0.1) is None
     named = [record.getMessage().partition(" of ")[0] for record in caplog.records if "no sweep" in record.msg]
-    assert named == [stream.name.partition(" of ")[0] for stream in pair.streams]
+    assert named == [stream.info.name.partition(" of ")[0] for stream in pair.streams]
     assert len(set(named)) == 2
 
 

@@ -65,7 +65,7 @@ class JointLive:
         self._arrived = threading.Condition()
         self.faults = Faults()
         for sensor, stream in zip(sensors, streams, strict=True):
-            stream.name = f"{sensor.name} of {stream.info.name}"
+            stream.info = replace(stream.info, name=f"{sensor.name} of {stream.info.name}")  # as the log names it
             stream.arrived = self._arrived
             stream.faults = self.faults
         self._joiner = SweepJoiner(len(streams), tolerance_s([stream.info for stream in streams]))

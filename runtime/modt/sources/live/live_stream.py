@@ -62,7 +62,6 @@ class LiveStream:
 
     Attributes:
         info: properties of the stream, with n_frames None.
-        name: what the log calls it.
         faults: unusable sweeps and points.
         sweeps, incomplete, dropped: numbers of sweeps received, of sweeps with missing messages, and of sweeps that
             were not taken before a newer one or the end.
@@ -92,7 +91,6 @@ class LiveStream:
             pause: waits for a time [s] after a failed read.
         """
         self.info = info
-        self.name = info.name
         self.reader = reader
         self.faults = Faults()
         self.sweeps = 0
@@ -158,7 +156,7 @@ class LiveStream:
                 self.silences += 1
                 remedy = self.reader.reception.silence or "check its power, cable, address and port"
                 remedy = f"{remedy}; tracks are kept until it returns"
-                log.warning("%s: no sweep for %.0f s; %s", self.name, SILENT_S, remedy)
+                log.warning("%s: no sweep for %.0f s; %s", self.info.name, SILENT_S, remedy)
             return None
         return self._frame(taken)
 
@@ -204,7 +202,7 @@ class LiveStream:
 
     def _receive(self) -> None:
         if refused := host.serve_loop(self._cores):
-            log.warning("%s: %s", self.name, refused)
+            log.warning("%s: %s", self.info.name, refused)
         while not self._ended and self._error is None:
             self._read()
 
@@ -220,13 +218,13 @@ class LiveStream:
         except Exception as error:
             if not self._ended and self.reader.reception.refuse(f"failed ({type(error).__name__})"):
                 remedy = "check its network interface" if isinstance(error, OSError) else "report this"
-                log.exception("%s: a message is left out: %s; later ones are counted", self.name, remedy)
+                log.exception("%s: a message is left out: %s; later ones are counted", self.info.name, remedy)
             self._pause(0.001)  # leaves the CPU to others if each read fails
 
     def _put(self, sweep: Sweep) -> None:
         usable = True
         try:  # here, off the loop's thread
-            _, flaws = sanitised(sweep.points, self.name)
+            _, flaws = sanitised(sweep.points, self.info.name)
         except ScanError as error:
             flaws = [error.cause]
             usable = False
@@ -250,7 +248,7 @@ class LiveStream:
         """The frame of a sweep; None if it cannot be used."""
         sweep = taken.sweep
         if self._silent:
-            log.warning("%s: sweeps again after %.1f s", self.name, taken.arrived_s - self._last_s)
+            log.warning("%s: sweeps again after %.1f s", self.info.name, taken.arrived_s - self._last_s)
         self._silent = False
         self._last_s = max(self._last_s, taken.arrived_s)
         index = self._index if sweep.index is None else sweep.index
@@ -258,7 +256,7 @@ class LiveStream:
         doubt = self._doubt(sweep.stamp_s, taken.arrived_s)
         usable = taken.usable and not doubt
         if flaws := [doubt] if doubt else taken.flaws:
-            self.faults.report(index, self.name, "; ".join(flaws), skipped=not usable)
+            self.faults.report(index, self.info.name, "; ".join(flaws), skipped=not usable)
         if not usable:
             return None
         frame = Frame(
@@ -292,7 +290,7 @@ class LiveStream:
             unit = unit_of(check.passed_s / check.waited_s) if check.waited_s else None
             why = f"are they in {unit}? have its driver write s" if unit else "a clock was set, or they come late"
             what = f"stamps have stepped by {check.passed_s - check.waited_s:+.3f} s against their arrival"
-            log.warning("%s: %s: %s; they are followed", self.name, what, why)
+            log.warning("%s: %s: %s; they are followed", self.info.name, what, why)
         self._delay.unwrapped(stamp_s, arrived_s)
         stepped = doubting or abs(self._delay.offset_s - before_s) > JITTER_S
         self._steady_s += check.waited_s if stepped else check.passed_s
