@@ -15,7 +15,7 @@ import argparse
 import logging
 import sys
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -140,12 +140,12 @@ class Episode:
         return replace(whole if k == self.begin else frame, points=np.concatenate(parts))
 
 
-def drawn(rng: np.random.Generator) -> tuple[Episode, Episode]:
+def drawn(rng: np.random.Generator, changes: Sequence[Change] = CHANGES) -> tuple[Episode, Episode]:
     """Two faults; the second one begins while the first one lasts, and ends after it."""
-    one, other = rng.choice(len(CHANGES), 2, replace=False)
+    one, other = rng.choice(len(changes), 2, replace=False)
     first, second = overlapping(rng)
     turned = rng.random(2)
-    return Episode(CHANGES[one], *first, turned[0]), Episode(CHANGES[other], *second, turned[1])
+    return Episode(changes[one], *first, turned[0]), Episode(changes[other], *second, turned[1])
 
 
 def overlapping(rng: np.random.Generator) -> tuple[tuple[int, int], tuple[int, int]]:
@@ -156,20 +156,25 @@ def overlapping(rng: np.random.Generator) -> tuple[tuple[int, int], tuple[int, i
     return (FIRST, end), (begin, max(begin + int(lengths[1]), end))
 
 
-def levels_of(stream: SyntheticStream, frames: list[Frame], pair: tuple[Episode, Episode]) -> list[TrustLevel]:
-    """The trust of each frame of a drive with two faults."""
-    stages = Stages(Request(profile=[SENSOR], odometry="recording"), stream.info, Ledger(), live=True)
-    stages.choose_profile(frames[0])
-    levels = []
+def faulty(frames: Sequence[Frame], pair: Sequence[Episode]) -> Iterator[Frame]:
+    """The frames of a drive with two faults. A frozen sensor repeats what it sent before."""
     points = frames[0].points
     for k, frame in enumerate(frames):
         given = frame
         for episode in pair:
             given = episode.changes(k, given, frames[episode.begin - 1])
-        # A frozen sensor repeats what it sent before.
         if any(e.change.freezes and e.begin <= k < e.end for e in pair):
             given = replace(given, points=points)
         points = given.points
+        yield given
+
+
+def levels_of(stream: SyntheticStream, frames: list[Frame], pair: tuple[Episode, Episode]) -> list[TrustLevel]:
+    """The trust of each frame of a drive with two faults."""
+    stages = Stages(Request(profile=[SENSOR], odometry="recording"), stream.info, Ledger(), live=True)
+    stages.choose_profile(frames[0])
+    levels = []
+    for k, given in enumerate(faulty(frames, pair)):
         levels.append(stages.step(given, stages.budget, reduced=False).trust.level)
         stages.ledger.close_frame(k)
         stages.adapt(given)

@@ -31,9 +31,10 @@ import numpy as np
 
 from modt.types import Frame
 from modt_simulation.synthetic_stream import SyntheticStream
+from tools import fault_pairs
 from tools.deploy.faults import FAULTS, NO_FAULT
 from tools.deploy.sender import Faulty
-from tools.fault_pairs import CHANGES, SECONDS, SENSOR, Change, moved_by, overlapping, pair_options
+from tools.fault_pairs import CHANGES, SECONDS, SENSOR, Change, Episode, faulty, pair_options
 from tools.send.faults import Timed
 from tools.send.ideal_packets import packets_of
 from tools.send.loops import VelodyneStamps
@@ -57,11 +58,10 @@ JITTER = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
-class LiveFault:
-    """A fault of the scene or the poses, of the network, or a signal to the process."""
+class OtherFault(Change):
+    """A fault that the sweeps do not show: of the network, or a signal to the process. It has to be counted."""
 
-    name: str
-    change: Change | None = None
+    limit_s: float = np.inf
     signals: tuple[signal.Signals, ...] = ()
     counted: Callable[[dict[str, Any]], int] = lambda status: 0
 
@@ -84,29 +84,18 @@ NETWORK = {
     "clock set back": _refused,
 }
 LIVE_FAULTS = (
-    *(LiveFault(change.name, change) for change in CHANGES),
-    *(LiveFault(name, counted=counter) for name, counter in NETWORK.items()),
-    LiveFault("reload", signals=(signal.SIGHUP,), counted=lambda status: int(status["loop"]["reloads"])),
+    *CHANGES,
+    *(OtherFault(name, counted=counter) for name, counter in NETWORK.items()),
+    OtherFault("reload", signals=(signal.SIGHUP,), counted=lambda status: int(status["loop"]["reloads"])),
 )
 
 
-@dataclass(frozen=True, slots=True)
-class LiveEpisode:
-    """A fault from one sweep up to another one."""
-
-    fault: LiveFault
-    begin: int
-    end: int
-
-
-def drawn(rng: np.random.Generator) -> tuple[LiveEpisode, LiveEpisode]:
+def drawn(rng: np.random.Generator) -> tuple[Episode, Episode]:
     """Two faults, of which one at most is of the network; the second one begins while the first one lasts."""
     while True:
-        one, other = (LIVE_FAULTS[k] for k in rng.choice(len(LIVE_FAULTS), 2, replace=False))
-        if not (one.name in NETWORK and other.name in NETWORK):
-            break
-    first, second = overlapping(rng)
-    return LiveEpisode(one, *first), LiveEpisode(other, *second)
+        pair = fault_pairs.drawn(rng, LIVE_FAULTS)
+        if not all(episode.change.name in NETWORK for episode in pair):
+            return pair
 
 
 class Sender:
@@ -123,7 +112,7 @@ class Sender:
     def __init__(
         self,
         frames: Sequence[Frame],
-        pair: Sequence[LiveEpisode],
+        pair: Sequence[Episode],
         ports: tuple[int, int],
         hang_up: Callable[[signal.Signals], None],
         ready: Callable[[], bool],
@@ -142,23 +131,6 @@ class Sender:
         """Whether the machine is too busy for the run to count."""
         return self.latest_s > MOST_LATE_S
 
-    def _active(self, sweep: int) -> list[LiveEpisode]:
-        return [episode for episode in self._pair if episode.begin <= sweep < episode.end]
-
-    def _given(self) -> list[Frame]:
-        """The sweeps and their poses with the changes of their times. A frozen sensor repeats what it has sent."""
-        given: list[Frame] = []
-        for sweep, frame in enumerate(self._frames):
-            changed = frame
-            frozen = False
-            for episode in self._active(sweep):
-                change = episode.fault.change
-                if change is not None:
-                    frozen |= change.freezes
-                    changed = moved_by(change, changed, self._frames[episode.begin - 1])
-            given.append(replace(changed, points=given[-1].points) if frozen else changed)
-        return given
-
     def _waiting(self) -> list[Frame]:
         """Sweeps at the begin of the drive, before the run is ready; without noise they would be frozen."""
         rng = np.random.default_rng(0)
@@ -168,7 +140,7 @@ class Sender:
 
     def run(self) -> None:
         """Send the drive in real time, until it is too late. All that takes long is done before."""
-        given = self._given()
+        given = list(faulty(self._frames, self._pair))
         drive = [payload for _, payload in packets_of(given, SENSOR, PERIOD_S)]
         waiting = [payload for _, payload in packets_of(self._waiting(), SENSOR, PERIOD_S)]
         with (
@@ -228,11 +200,11 @@ class Sender:
 
     def _switch(self, before: int, sweep: int) -> None:
         """Begin and end the faults of the network, and send the signals that are due."""
-        named = [e.fault.name for e in self._active(sweep) if e.fault.name in NETWORK]
+        named = {e.change.name for e in self._pair if e.begin <= sweep < e.end} & NETWORK.keys()
         self._faulty.fault = next((f for f in FAULTS if f.name in named), NO_FAULT)
         for episode in self._pair:
-            if before < episode.begin <= sweep:
-                for number in episode.fault.signals:
+            if before < episode.begin <= sweep and isinstance(episode.change, OtherFault):
+                for number in episode.change.signals:
                     self._hang_up(number)
 
     def _send_poses(self, to: socket.socket, pair: Sequence[Frame], begin_s: float) -> None:
@@ -287,7 +259,7 @@ def started(folder: Path) -> bool:
     return bool(status_of(folder).get("counts", {}).get("frames"))
 
 
-def tried(frames: Sequence[Frame], pair: Sequence[LiveEpisode]) -> list[str] | None:
+def tried(frames: Sequence[Frame], pair: Sequence[Episode]) -> list[str] | None:
     """What a live run with a pair of faults does not keep; None if the packets were late, so it does not count."""
     with tempfile.TemporaryDirectory(prefix="modt-pairs-") as name:
         folder = Path(name) / "run"
@@ -317,7 +289,7 @@ def tried(frames: Sequence[Frame], pair: Sequence[LiveEpisode]) -> list[str] | N
         return [*broken, *judged(folder, pair, sender.began_s)]
 
 
-def judged(folder: Path, pair: Sequence[LiveEpisode], began_s: float) -> Iterator[str]:
+def judged(folder: Path, pair: Sequence[Episode], began_s: float) -> Iterator[str]:
     """Faults of a pair that were silent in the records of a run, and records that are missing."""
     lines = [json.loads(line) for line in (folder / "tracks.jsonl").read_text().splitlines()]
     status = status_of(folder)
@@ -332,10 +304,10 @@ def judged(folder: Path, pair: Sequence[LiveEpisode], began_s: float) -> Iterato
     sweep = (np.array([line["stamp_s"] for line in lines]) - began_s) / PERIOD_S
     good = np.array([line["trust"]["level"] == "good" for line in lines])
     for episode, other in (pair, pair[::-1]):
-        change = episode.fault.change
-        if change is None:
-            if not episode.fault.counted(status):
-                yield f"{episode.fault.name}: not counted"
+        change = episode.change
+        if isinstance(change, OtherFault):
+            if not change.counted(status):
+                yield f"{change.name}: not counted"
             continue
         visible = max(episode.begin, other.end if other.begin <= episode.begin else 0)
         late = (sweep > visible + change.limit_s / PERIOD_S + 1) & (sweep < episode.end - 1)
@@ -375,7 +347,7 @@ def main() -> None:
     with ProcessPoolExecutor(given.parallel) as pool, given.out.open("a", encoding="utf-8") as out:
         results = pool.map(partial(_tried_number, frames, given.seed), numbers)
         for number, broken in zip(numbers, results, strict=True):
-            names = " and ".join(f"{e.fault.name} ({e.begin} to {e.end})" for e in pairs[number])
+            names = " and ".join(f"{e.change.name} ({e.begin} to {e.end})" for e in pairs[number])
             if broken is None:
                 print(f"{names}: not counted, as the machine was too busy", flush=True)
                 continue

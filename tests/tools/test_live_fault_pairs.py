@@ -8,10 +8,11 @@ import pytest
 
 from modt.types import Frame
 from tools import live_fault_pairs
-from tools.live_fault_pairs import LIVE_FAULTS, NETWORK, PERIOD_S, LiveEpisode
+from tools.fault_pairs import Episode
+from tools.live_fault_pairs import LIVE_FAULTS, NETWORK, PERIOD_S
 
 FAULTS = {fault.name: fault for fault in LIVE_FAULTS}
-PAIR = (LiveEpisode(FAULTS["covered"], 60, 120), LiveEpisode(FAULTS["loss"], 80, 140))
+PAIR = (Episode(FAULTS["covered"], 60, 120, 0.4), Episode(FAULTS["loss"], 80, 140, 0.4))
 
 
 def recorded(folder, good, lost=3, frames=200, fates=(), sweeps=205):
@@ -57,13 +58,13 @@ def test_a_pair_overlaps_and_has_one_fault_of_the_network_at_most():
     for _ in range(200):
         one, other = live_fault_pairs.drawn(rng)
         assert one.begin < other.begin < one.end <= other.end
-        assert not {one.fault.name, other.fault.name} <= NETWORK.keys()
+        assert not {one.change.name, other.change.name} <= NETWORK.keys()
 
 
 def test_a_silence_ends_though_no_packet_of_it_is_sent(monkeypatch):
     """The faults and the poses go on with the packets of the sensor, not with those that arrive."""
     frames = [Frame(k, PERIOD_S * k, np.zeros((1, 4), np.float32), np.eye(4)) for k in range(40)]
-    pair = (LiveEpisode(FAULTS["silence"], 10, 20), LiveEpisode(FAULTS["reload"], 15, 25))
+    pair = (Episode(FAULTS["silence"], 10, 20, 0.4), Episode(FAULTS["reload"], 15, 25, 0.4))
     signals = []
     sender = live_fault_pairs.Sender(frames, pair, (1, 2), signals.append, lambda: True)
     monkeypatch.setattr(sender, "_await", lambda at_s: None)
