@@ -135,6 +135,30 @@ def test_few_beams_are_no_turned_scene(scene, share):
     assert "scene" not in keys
 
 
+@pytest.mark.parametrize("scene", ["street", "yard"])
+@pytest.mark.parametrize("share", [0.1, 0.3, 0.5, 0.7, 0.9])
+def test_a_turn_that_registration_takes_for_a_motion_is_reported_and_withdrawn(scene, share):
+    """The packets of a turned head leap in azimuth, so the rest of the sweep is lost, and a part of the next."""
+    watch = TrustWatch(load(SENSOR).sensor)
+    leap = se3(rotation_zyx(0.0, 0.0, 0.09), np.array([-0.9, 1.4, 0.0]))
+    T_leapt = np.eye(4)
+    levels = []
+    for k, frame in enumerate(drive(scene)):
+        points = FAULTS["turned by 90 deg"](frame.points, k) if ONSET < k <= END else frame.points
+        turn = (np.pi - bearing(points)) / (2 * np.pi)
+        if k in (ONSET, END):
+            points = points[turn < share]
+        if k in (ONSET + 1, END + 1):
+            points = points[turn > 0.12]
+            T_leapt = T_leapt @ leap
+        T_world_sensor = frame.T_world_sensor @ T_leapt
+        levels.append(watch.add(replace(frame, points=points, T_world_sensor=None), T_world_sensor).level)
+    levels = np.array(levels)
+    assert (levels[:ONSET] == TrustLevel.GOOD).all()
+    assert (levels[ONSET + 20 : END] > TrustLevel.GOOD).all()
+    assert levels[-1] == TrustLevel.GOOD
+
+
 def few_beams(points, k):
     """Points of every eighth beam, a tenth nearer."""
     beam = np.rint((np.rad2deg(np.arctan(tangent(points))) + 15) / 2).astype(int)

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from modt.config import SensorConfig
+from modt.geometry import inverse
 from modt.types import Bool, Float32, Float64, Frame, Int
 
 SAMPLE = 2003
@@ -47,6 +48,7 @@ class Sample:
         weight: number of points for which one stands.
         plane: (3,) ground z = plane @ (1, x, y) as it was known before.
         T_world_sensor: (4, 4) pose.
+        step: (4, 4) pose in the sensor frame of the sweep before.
         pose_given: whether the frame came with a pose, so that the sweeps do not tell their own motion.
         R_level_sensor: (3, 3) from the sensor to the level frame, None if it is level.
     """
@@ -57,6 +59,7 @@ class Sample:
     weight: float
     plane: Float64
     T_world_sensor: Float64
+    step: Float64
     pose_given: bool = True
     R_level_sensor: Float64 | None = None
 
@@ -122,15 +125,18 @@ Three = tuple[Sample, Sample, Sample]
 """Three sweeps in a row."""
 
 
-def sample(frame: Frame, T_world_sensor: Float64, sensor: SensorConfig, plane: Float64) -> Sample:
-    """The sample of a level frame over a ground (3,)."""
+def sample(
+    frame: Frame, T_world_sensor: Float64, sensor: SensorConfig, plane: Float64, before: Sample | None = None
+) -> Sample:
+    """The sample of a level frame over a ground (3,), and after another one."""
     n = len(frame.points)
     rows = _rows(n)
     weight = n / max(len(rows), 1)
     raw = frame.points.take(rows, axis=0)
     reach_m = REACH_SHARE * sensor.max_range_m
     pose_given = frame.T_world_sensor is not None
-    return Sample(frame.time_s, raw, reach_m, weight, plane, T_world_sensor, pose_given, frame.R_level_sensor)
+    step = np.eye(4) if before is None else inverse(before.T_world_sensor) @ T_world_sensor
+    return Sample(frame.time_s, raw, reach_m, weight, plane, T_world_sensor, step, pose_given, frame.R_level_sensor)
 
 
 def part_of_turn(turn: Float32, n: int) -> Int:

@@ -6,8 +6,8 @@ mirror reverses the bearing (Fourier-Mellin).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,12 +19,15 @@ from modt.types import Bool, Float32, Float64, Int
 BEARINGS = 72
 LOG_STEP = 0.08
 """Width of a cell in the logarithm of the range."""
+OF_SECTOR = BEARINGS // SECTORS
 FIRST_RANGE_M = 1.0
 """Range of the first cell [m]."""
 RANGES = 50
 """Cells along the range, up to 54 m."""
 MIN_POINTS = 40
 """Fewest obstacle points in which a scene is compared."""
+LEAST_SEEN = 0.5
+"""Share of the obstacle points that a turn brings into view of the sweep before at least."""
 TURN_TOLERANCE = 2
 """Bearings by which a scene may be turned and count as unchanged."""
 SCALE_TOLERANCE = 1
@@ -150,6 +153,10 @@ class SceneCheck:
             self._compared = first, now, agreement(first, now, self._known_change(now))
         return self._compared[2]
 
+    def _pair_agreement(self, before: Sample, after: Sample) -> float:
+        """Greatest share of the obstacle points that stood still between two sweeps by a pose of the second one."""
+        return max(agreement(before, placed, self._known_change(after)) for placed in _as_placed(before, after))
+
     def _known_change(self, now: Sample) -> Change:
         """Change by which sweeps are compared. A pose that is registered by sweeps is one of the changed sensor."""
         return self.change if now.pose_given else SAME
@@ -169,14 +176,15 @@ class SceneCheck:
         What begins within a sweep falls into two pairs that follow one another, and only the pair around that sweep
         shows all of it. Both may agree equally little, so the one to which an explanation adds most is taken.
         """
-        agreed = np.array([agreement(before, after, self._known_change(after)) for before, after in pairs])
+        agreed = np.array([self._pair_agreement(before, after) for before, after in pairs])
         if not len(agreed) or agreed.min() >= self._tuning.suspected:
             return
         least = int(agreed.argmin())
         found = []
         for k in range(max(least - 1, 0), min(least + 2, len(pairs))):
-            change, share = explain(*pairs[k], self._known_change(pairs[k][1]))
-            found.append((share - float(agreed[k]), k, change))
+            for after in _as_placed(*pairs[k]):
+                change, share = explain(pairs[k][0], after, self._known_change(after))
+                found.append((share - float(agreed[k]), k, change))
         gain, k, change = max(found, key=lambda each: each[0])
         if self._is_explained(change, float(agreed[k]), gain, on_moved_ground=on_moved_ground):
             if self.before is None:
@@ -196,6 +204,16 @@ class SceneCheck:
         return gain >= max(needed - agreed, tuning.better)
 
 
+def _as_placed(before: Sample, after: Sample) -> Iterator[Sample]:
+    """The second of two sweeps by its pose and, unless that is given, as if the motion before had gone on.
+
+    Registration takes a scene that changes at once for a motion, if it finds any.
+    """
+    yield after
+    if not after.pose_given:
+        yield replace(after, T_world_sensor=before.T_world_sensor @ before.step @ before.step)
+
+
 def _cells(x: Float32, y: Float32, turn: Float32) -> Int:
     """(k,) cells of points, below 0 where they are beyond the grid."""
     bearing = part_of_turn(turn, BEARINGS)
@@ -204,19 +222,18 @@ def _cells(x: Float32, y: Float32, turn: Float32) -> Int:
 
 
 def places(before: Sample, after: Sample, change: Change) -> tuple[Int, Int]:
-    """Cells of the obstacle points of two sweeps in the frame of the second one, where both have returns at all."""
+    """Cells of the obstacle points of two sweeps in the frame of the second one."""
     a = change.motion(before, after).astype(np.float32)
     x, y = a[:2, :3] @ before.xyz.take(before.obstacles, axis=1) + a[:2, 3:]
     known = _cells(x, y, turn_of(x, y))
     x, y, _ = after.xyz.take(after.obstacles, axis=1)
     cells = _cells(x, y, after.turn.take(after.obstacles))
-    return _in(known, after.seen), _in(cells, before.seen)
+    return known[known >= 0], cells[cells >= 0]
 
 
 def _in(cells: Int, seen: Bool) -> Int:
     """The cells of the grid that are in seen sectors (SECTORS,)."""
-    of_sector = RANGES * BEARINGS // SECTORS
-    return np.asarray(cells[(cells >= 0) & seen.take(cells // of_sector, mode="clip")])
+    return np.asarray(cells[seen.take(cells // (RANGES * OF_SECTOR))])
 
 
 def _grown(cells: Int) -> Bool:
@@ -235,6 +252,8 @@ def _grown(cells: Int) -> Bool:
 def agreement(before: Sample, after: Sample, change: Change) -> float:
     """Share of the obstacle points of a sweep that stand where the one before had some; 1 with too few."""
     known, cells = places(before, after, change)
+    known = _in(known, after.seen)
+    cells = _in(cells, before.seen)
     if min(len(known), len(cells)) < MIN_POINTS:
         return 1.0
     return float(_grown(known).ravel().take(cells).mean())
@@ -251,14 +270,18 @@ def explain(before: Sample, after: Sample, known_change: Change) -> tuple[Change
     wide = np.zeros((BEARINGS, n))
     wide[:, :RANGES] = _grown(known)
     spectrum = np.conj(np.fft.rfft2(wide))
+    seen = np.conj(np.fft.rfft(before.seen.repeat(OF_SECTOR)))
     found = []
     for mirrored in (False, True):
         bearing, far = np.divmod(cells, RANGES)
         if mirrored:
             bearing = BEARINGS - 1 - bearing
         now = np.bincount(bearing * n + far, minlength=BEARINGS * n).reshape(BEARINGS, n).astype(np.float64)
-        # Points on known places for every turn and scale at once: the cross-correlation of both grids.
-        hits = np.fft.irfft2(spectrum * np.fft.rfft2(now), s=wide.shape) / max(len(cells), 1)
+        # Points on known places for every turn and scale at once: the cross-correlation of both grids. Of the points
+        # only those count that the sweep before could have seen there: one in which a head turns is broken.
+        could = np.fft.irfft(seen * np.fft.rfft(now.sum(axis=1)), BEARINGS)
+        hits = np.fft.irfft2(spectrum * np.fft.rfft2(now), s=wide.shape)
+        hits /= np.maximum(could, max(LEAST_SEEN * len(cells), 1))[:, None]
         scales = np.arange(n)
         scales[n // 2 :] -= n
         turned, column = np.divmod(int((hits - UNSCALED_FAVOUR * np.abs(scales)).argmax()), n)

@@ -122,7 +122,8 @@ class TrustWatch:
             T_world_sensor: (4, 4) its pose.
             others: findings of other checks by their names.
         """
-        sweep = sample(frame, T_world_sensor, self._sensor, self._ground.present)
+        before = self._samples[-1] if self._samples else None
+        sweep = sample(frame, T_world_sensor, self._sensor, self._ground.present, before)
         now_s = sweep.time_s
         if self._began_s is None:
             self._began_s = now_s
