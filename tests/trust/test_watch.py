@@ -8,6 +8,8 @@ import pytest
 
 from modt.geometry import rotation_zyx, se3
 from modt.profile import load
+from modt.trust.sample import sample
+from modt.trust.scene import BEARINGS, SAME, TURN_TOLERANCE, explain
 from modt.trust.watch import Finding, TrustWatch
 from modt.types import Frame, TrustLevel
 from modt_simulation.synthetic_stream import SyntheticStream
@@ -157,6 +159,21 @@ def test_a_turn_that_registration_takes_for_a_motion_is_reported_and_withdrawn(s
     assert (levels[:ONSET] == TrustLevel.GOOD).all()
     assert (levels[ONSET + 20 : END] > TrustLevel.GOOD).all()
     assert levels[-1] == TrustLevel.GOOD
+
+
+def test_a_turn_explains_the_points_that_a_broken_sweep_before_could_have_seen():
+    """Of its obstacles only those count that the turn brings into view of the sweep before."""
+    points = drive("street")[ONSET].points
+    broken = points[bearing(points) > -0.5]
+    plane = np.array([-load(SENSOR).sensor.height_m, 0.0, 0.0])
+    before, after = (
+        sample(Frame(k, 0.1 * k, each), np.eye(4), load(SENSOR).sensor, plane)
+        for k, each in enumerate((broken, FAULTS["turned by 90 deg"](points, ONSET)))
+    )
+    change, share = explain(before, after, SAME)
+    assert not change.mirrored
+    assert abs(change.turned - BEARINGS // 4) <= TURN_TOLERANCE
+    assert share > 0.95
 
 
 def few_beams(points, k):
