@@ -26,7 +26,7 @@ RANGES = 50
 """Cells along the range, up to 54 m."""
 MIN_POINTS = 40
 """Fewest obstacle points in which a scene is compared."""
-LEAST_SEEN = 0.5
+LEAST_SEEN = 0.75
 """Share of the obstacle points that a turn brings into view of the sweep before at least."""
 TURN_TOLERANCE = 2
 """Bearings by which a scene may be turned and count as unchanged."""
