@@ -81,7 +81,8 @@ class GroundCheck:
         return self.plane + self._offset if moved else self.plane
 
     @property
-    def _known(self) -> bool:
+    def known(self) -> bool:
+        """Whether the lowest returns have been on the plane for some looks."""
         return self._known_looks >= KNOWN_LOOKS
 
     def look(self, now: Sample, threes: Sequence[Three], back_looks: int) -> None:
@@ -97,7 +98,7 @@ class GroundCheck:
             back_looks: number of looks in a row in which it has to be back.
         """
         self.undone = False
-        if not self._known:
+        if not self.known:
             return
         self._add_steps(threes)
         if self._before is None:
@@ -114,11 +115,11 @@ class GroundCheck:
 
     def has_moved(self, before: Sample, now: Sample) -> bool:
         """Whether the ground stands elsewhere than in a sweep before, at once or not."""
-        return self._known and self._size(_moved_between(before, now)) >= self._least()
+        return self.known and self._size(_moved_between(before, now)) >= self._least()
 
     def look_past(self, before: Sample, now: Sample, *, same_place: bool) -> None:
         """Notice a ground that moved since a sweep after which nothing was seen, though slopes may have passed."""
-        if not self._known or self._before is not None:
+        if not self.known or self._before is not None:
             return
         steps = (_moved_between(before, now), self._from_plane(now))
         if min(self._size(step) for step in steps) >= (1.0 if same_place else UNSEEN_FACTOR):

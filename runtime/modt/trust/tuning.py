@@ -130,6 +130,24 @@ class GroundTuning:
 
 
 @dataclass(frozen=True, slots=True)
+class MountTuning:
+    """Tilt of the ground of the last looks against that of the first ones."""
+
+    first_looks: int = 30
+    """Number of looks with a known ground whose mean is that of the start. Less: earlier, and uneven ground at the
+    start counts.
+    Chosen on: judgement."""
+
+    memory_looks: int = 15
+    """Number of looks over which the ground is averaged later. Less: earlier, and uneven ground is reported.
+    Chosen on: simulated drives over hills, ramps and stairs."""
+
+    tilt_deg: float = 8.0
+    """Tilt beyond which it is reported [deg]. Less: uneven ground is reported.
+    Chosen on: simulated drives over hills, ramps and stairs."""
+
+
+@dataclass(frozen=True, slots=True)
 class SceneTuning:
     """Obstacles against those of the sweep before, brought by the pose into the present one."""
 
@@ -192,6 +210,7 @@ class TrustTuning:
     returns: ReturnsTuning = ReturnsTuning()
     lasting: LastingTuning = LastingTuning()
     ground: GroundTuning = GroundTuning()
+    mount: MountTuning = MountTuning()
     scene: SceneTuning = SceneTuning()
 
     look_s: float = 0.6

@@ -11,6 +11,7 @@ import numpy as np
 from modt.config import SensorConfig
 from modt.trust.ground import GroundCheck
 from modt.trust.lasting import BeamHistory, SectorHistory
+from modt.trust.mount import MountHistory
 from modt.trust.returns import Loss, ReturnsCheck
 from modt.trust.sample import Sample, Three, sample
 from modt.trust.scene import SceneCheck
@@ -82,6 +83,7 @@ class TrustWatch:
         self._tuning = tuning
         self._returns = ReturnsCheck(tuning.returns)
         self._ground = GroundCheck(tuning.ground, sensor.height_m)
+        self._mount = MountHistory(tuning.mount)
         self._scene = SceneCheck(tuning.scene)
         self._beams = BeamHistory(sensor, tuning.lasting)
         self._sectors = SectorHistory(sensor, tuning.lasting)
@@ -151,6 +153,8 @@ class TrustWatch:
         if not own_findings and not own_reasons:
             self._returns.learn(sweep, elapsed_s)
             self._ground.learn(sweep)
+            if self._ground.known:
+                self._mount.add(self._ground.plane, sweep.R_level_sensor)
         self._samples = self._samples[-1:]
         self._looked_s = now_s
         self.trust = self._judged(now_s)
@@ -205,6 +209,9 @@ class TrustWatch:
             which = ", ".join(f"{each_deg:.1f}" for each_deg in dead_deg)
             what = f"no returns from the beam{'s' * (len(dead_deg) > 1)} at {which} deg of elevation"
             yield "beams", Finding(TrustLevel.DEGRADED, what, REPAIR)
+        if self._mount.is_tilted:
+            what = f"the ground has tilted by {self._mount.tilt_deg:.0f} deg since the start"
+            yield "mount", Finding(TrustLevel.BLIND, what, MOUNT)
         if self._sectors.blocked_deg:
             from_deg, to_deg = self._sectors.blocked_deg
             what = f"no returns from {from_deg} to {to_deg} deg, counter-clockwise from ahead"
