@@ -106,6 +106,25 @@ def test_an_object_that_moves_does_so_until_it_is_more_likely_at_rest(object_cla
     assert follow(follower, [[]])[0] == [state]
 
 
+@pytest.mark.parametrize(
+    ("object_class", "way_m", "state"),
+    [
+        (ObjectClass.PEDESTRIAN, 1.3, "MOVING"),
+        (ObjectClass.PEDESTRIAN, 0.9, "UNKNOWN"),
+        (ObjectClass.CAR, 1.3, "UNKNOWN"),
+        (ObjectClass.BACKGROUND, 1.3, "UNKNOWN"),
+    ],
+)
+def test_an_object_that_probably_moves_does_so_once_it_is_gone_farther_than_its_length(object_class, way_m, state):
+    follower = Follower()
+    scene_at_rest = [box(8, 2, 0.6, 0.5)]
+    assert follow(follower, [scene_at_rest] * 12)[0][-1] == "STILL"
+    follower.set_class(0, object_class)
+    follower.tracks.moving_probability[:] = 0.8
+    follower.tracks.rest_position[:, 0] -= way_m
+    assert follow(follower, [[]])[0] == [state]
+
+
 @pytest.mark.parametrize(("hidden", "moves"), [(True, False), (False, True)])
 def test_a_surface_between_what_hides_it_does_not_move(hidden, moves):
     follower = Follower()

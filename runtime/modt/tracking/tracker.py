@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from modt.class_sizes import IS_PERSON
+from modt.class_sizes import IS_PERSON, WHOLE_SIZE_M
 from modt.classes import PERSON_HEIGHT_M, ObjectClass
 from modt.config import TrackingConfig
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
@@ -319,15 +319,18 @@ class Tracker:
 
         What flickers seems to move from one place to another, so no track starts to move as it reappears. An object
         that moves does so until it is more likely at rest. Who walks behind a trolley, for example, is bounded by it
-        in most frames, and shows little evidence of motion.
+        in most frames, and shows little evidence of motion. What bounds an object explains no way longer than itself.
         """
         t = self.tracks
         evidence = self._evidence
         probable = t.moving_probability > 0.5
         moved = t.motion == MotionState.MOVING.value
-        keeps_moving = moved & probable & (t.object_class != ObjectClass.BACKGROUND.value)
-        may_move = (t.moving_probability > evidence.moving) & (moved | ~t.reappears)
-        moves = (may_move | keeps_moving) & ~_is_shorter(t.x[:, :2] - t.rest_position, evidence.min_distance_m)
+        way = t.x[:, :2] - t.rest_position
+        is_object = probable & (t.object_class != ObjectClass.BACKGROUND.value)
+        certain = t.moving_probability > evidence.moving
+        certain |= is_object & ~_is_shorter(way, WHOLE_SIZE_M[t.object_class, 0])
+        moves = (certain & (moved | ~t.reappears)) | (is_object & moved)
+        moves &= ~_is_shorter(way, evidence.min_distance_m)
         is_decided = (moves | ~probable) & (t.hits >= evidence.min_hits)
         t.motion[:] = np.where(moves, MotionState.MOVING.value, MotionState.STILL.value)
         t.motion[~is_decided] = MotionState.UNKNOWN.value
@@ -362,8 +365,8 @@ class Tracker:
         self._update_extent(t, rows, proposals, observations, position, 0.0)
 
 
-def _is_shorter(step: Float64, length_m: float) -> Bool:
-    """(k,) which steps (k, 2) in the plane are shorter than a length [m]."""
+def _is_shorter(step: Float64, length_m: float | Float64) -> Bool:
+    """(k,) which steps (k, 2) in the plane are shorter than a length, or than (k,) ones [m]."""
     x, y = step.T
     shorter: Bool = x * x + y * y < length_m * length_m
     return shorter
