@@ -91,7 +91,7 @@ class OncePerSecond(logging.Filter):
 
     def filter(self, record: logging.LogRecord) -> bool:
         """Whether a line passes."""
-        kind = NUMBER.sub("#", f"{record.name} {record.getMessage()}")
+        kind = NUMBER.sub("#", f"{record.name} {record.msg}")
         now_s = self._clock()
         passed_s, held = self._passed.get(kind, (float("-inf"), 0))
         if now_s - passed_s < 1.0:

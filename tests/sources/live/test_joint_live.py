@@ -1,6 +1,7 @@
 """Two live sensors as one source: neither waits long for the other."""
 
 import socket
+import time
 from contextlib import ExitStack
 from itertools import islice
 from types import SimpleNamespace
@@ -17,7 +18,7 @@ from tests.sources.packets.simulated import packets
 from tools.send.loops import endless
 
 PERIOD_S = 0.1
-MOST_PACKETS = 100_000
+MOST_PACKETS = 20_000
 
 
 class Robot:
@@ -163,6 +164,7 @@ def test_packets_to_two_ports_are_frames_of_one_robot():
             for _, payload in islice(endless([payload for _, payload in packets("vlp-16")]), MOST_PACKETS):
                 for port in ports:
                     sender.sendto(payload, ("127.0.0.1", port))
+                time.sleep(1e-3)  # a busy machine loses packets that come all at once
                 received = source.take(0.0)
                 if received is not None and all(received.frame.sweeps):
                     both = received.frame

@@ -156,7 +156,9 @@ class LiveStream:
                 self.silences += 1
                 remedy = self.reader.reception.silence or "check its power, cable, address and port"
                 remedy = f"{remedy}; tracks are kept until it returns"
-                log.warning("%s: no sweep for %.0f s; %s", self.info.name, SILENT_S, remedy)
+                # The log takes lines of one format for one kind, so the name of the sensor is part of the format.
+                name = self.info.name.replace("%", "%%")
+                log.warning(f"{name}: no sweep for %.0f s; %s", SILENT_S, remedy)
             return None
         return self._frame(taken)
 
