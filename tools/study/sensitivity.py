@@ -10,7 +10,8 @@ well, which means something only on a machine that does nothing else. A differen
 excludes zero.
 
 RESULTS is a JSON file to which every result is added as it comes; constants that it holds are not run again. --only
-runs the constants whose name begins with PART. --write puts the tables of all results into the page.
+runs the constants whose name begins with PART. --write runs nothing: it puts the results of RESULTS into the tables
+of the page. Constants without a result keep what the page says of them, unless their value has changed since.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from __future__ import annotations
 import ast
 import inspect
 import json
+import re
 import textwrap
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -57,7 +59,11 @@ TOGETHER = 5
 """Constants that are compared with the same run of the shipped values."""
 MEASURES = ("AP", "length", "calls", "CPU")
 SIGNS = {"-": -CHANGE, "+": CHANGE}
-NOT_MEASURED = dict.fromkeys(SIGNS, "")
+UNKNOWN = "-"
+EFFECT = re.compile(r"(?P<bold>\*\*)?(?P<points>[+-]?[\d.]+)(\*\*)?")
+"""A cell of the page that holds a number."""
+ROW = re.compile(r"^\| `(?P<name>\S+)` \| (?P<value>\S+) \| (?P<others>.*) \|$", re.MULTILINE)
+"""A row of the page."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,32 +208,55 @@ def _both_ways(drives: Sequence[Drive], constant: Constant, shipped: Sequence[Sc
     return found
 
 
-def tables(results: Mapping[str, Mapping[str, Any]], measures: Sequence[str]) -> str:
-    """Markdown of the constants that matter most, and of every stage, with some of MEASURES.
+def effects(results: Mapping[str, Mapping[str, Any]], n_measures: int) -> dict[str, list[str]]:
+    """Cells of each constant that has a result: some measures of the value lowered, then of the value raised."""
+    found = {}
+    for name, result in results.items():
+        found[name] = [cell for sign in SIGNS for cell in _cells(result[sign], n_measures)]
+    return found
 
-    Constants without a result come last.
+
+def effects_on_page(page: str, n_measures: int) -> dict[str, list[str]]:
+    """Cells of each constant whose effect the page shows, and whose value is still the one it shows."""
+    shipped = {constant.name: f"{constant.value:g}" for constant in constants(tuning.MethodTuning())}
+    found = {}
+    for stage in re.split(r"^### ", page, flags=re.MULTILINE)[2:]:  # the first part has no table, the second the top
+        for row in ROW.finditer(stage):
+            name = f"{stage.split()[0].lower()}.{row['name']}"
+            cells = row["others"].split(" | ")[-len(SIGNS) * n_measures :]
+            if shipped.get(name) == row["value"] and UNKNOWN not in cells:
+                found[name] = cells
+    return found
+
+
+def tables(known: Mapping[str, Sequence[str]], measures: Sequence[str], n_drives: int) -> str:
+    """Markdown of the constants that matter most, and of every stage. Constants of unknown effect come last.
+
+    Args:
+        known: cells of the constants whose effect is known.
+        measures: those of MEASURES that the cells are of.
+        n_drives: number of drives of the last results.
     """
-    known = list(constants(tuning.MethodTuning()))
-    known.sort(key=lambda constant: _weight(results.get(constant.name)), reverse=True)
-    missing = sum(constant.name not in results for constant in known)
-    drives = len(next(iter(results.values()))["+"][0])
+    every = list(constants(tuning.MethodTuning()))
+    every.sort(key=lambda constant: _weight(known.get(constant.name, ()), len(measures)), reverse=True)
+    unknown = sum(constant.name not in known for constant in every)
     lines = [
-        f"At commit `{commit()}`, {drives} drives; made by `python -m {MARK}`.",
-        f"{missing} values, shown with -, were not measured.",
+        f"The last at commit `{commit()}`, {n_drives} drives; made by `python -m {MARK}`.",
+        f"Values that were not measured, shown with {UNKNOWN}: {unknown}.",
         "By chance alone one difference in twenty is bold.",
         "",
         f"### The {TOP} that matter most",
         "",
-        *_table([(constant.name, constant) for constant in known[:TOP]], results, measures),
+        *_table([(constant.name, constant) for constant in every[:TOP]], known, measures),
     ]
     for stage in [field.name for field in fields(tuning.MethodTuning)]:
-        own = [(constant.name.removeprefix(f"{stage}."), constant) for constant in known if constant.path[0] == stage]
-        lines += ["", f"### {stage.capitalize()}", "", *_table(own, results, measures)]
+        own = [(constant.name.removeprefix(f"{stage}."), constant) for constant in every if constant.path[0] == stage]
+        lines += ["", f"### {stage.capitalize()}", "", *_table(own, known, measures)]
     return "\n".join(lines)
 
 
 def _table(
-    named: Sequence[tuple[str, Constant]], results: Mapping[str, Mapping[str, Any]], measures: Sequence[str]
+    named: Sequence[tuple[str, Constant]], known: Mapping[str, Sequence[str]], measures: Sequence[str]
 ) -> Iterator[str]:
     """Rows of constants under the names that are shown."""
     shown = [f"{measure}, {sign}20 %" for sign in SIGNS for measure in measures]
@@ -235,25 +264,23 @@ def _table(
     yield f"| {' | '.join(head)} |"
     yield "|---" * len(head) + "|"
     for name, constant in named:
-        result = results.get(constant.name, NOT_MEASURED)
-        cells = [cell for sign in SIGNS for cell in _cells(result[sign], len(measures))]
+        cells = known.get(constant.name, [UNKNOWN] * len(shown))
         meaning, _, chosen = constant.meaning.partition("Chosen on: ")
         yield f"| `{name}` | {constant.value:g} | {meaning.strip()} | {chosen} | {' | '.join(cells)} |"
 
 
-def _weight(result: Mapping[str, Any] | None) -> tuple[float, float]:
-    """Largest effect on accuracy or track length whose interval excludes zero, then the largest of all [points]."""
-    if result is None:
+def _weight(cells: Sequence[str], n_measures: int) -> tuple[float, float]:
+    """Largest effect on accuracy or track length that is beyond doubt, then the largest of all [points]."""
+    of_result = [cell for k, cell in enumerate(cells) if k % n_measures < 2]
+    numbers = [found for found in map(EFFECT.fullmatch, of_result) if found]
+    if not numbers:
         return -1.0, -1.0
-    found = [np.array(row) for sign in SIGNS if not isinstance(result[sign], str) for row in result[sign][:2]]
-    effects = [(abs(float(row.mean())), margin(row)) for row in found]
-    certain = [effect for effect, width in effects if effect > width]
-    return max(certain, default=0.0), max((effect for effect, _ in effects), default=0.0)
+    sizes = [abs(float(number["points"])) for number in numbers]
+    bold_sizes = [size for size, number in zip(sizes, numbers, strict=True) if number["bold"]]
+    return max(bold_sizes, default=0.0), max(sizes)
 
 
 def _cells(side: str | list[list[float]], n: int = len(MEASURES)) -> list[str]:
-    if not side:
-        return ["-"] * n
     if isinstance(side, str):
         return ["refused"] * n
     return [summary(np.array(difference)) for difference in side[:n]]
@@ -271,19 +298,22 @@ def main() -> None:
     options.add_argument("--write", action="store_true")
     asked = options.parse_args()
     results: dict[str, Any] = json.loads(asked.results.read_text()) if asked.results.exists() else {}
+    if asked.write:
+        measures = MEASURES if asked.cpu else MEASURES[:-1]
+        known = effects_on_page(PAGE.read_text(), len(measures)) | effects(results, len(measures))
+        n_drives = len(next(iter(results.values()))["+"][0])
+        update(PAGE, MARK, tables(known, measures, n_drives))
+        return
     wanted = [one for one in constants(tuning.MethodTuning()) if one.name.startswith(asked.only)]
     missing = [one for one in wanted if one.name not in results]
-    if missing:
-        drives = tuple(product(asked.scenes, SENSORS, (asked.seconds,), range(*asked.seeds)))
-        few = [missing[k : k + TOGETHER] for k in range(0, len(missing), TOGETHER)]
-        with Engine(asked.jobs) as engine:
-            for _, found in engine.results(partial(run, drives), few):
-                results |= {result["name"]: result for result in found}
-                asked.results.write_text(json.dumps(results))
-                for result in found:
-                    print(result["name"], *(" ".join(_cells(result[sign])) for sign in SIGNS), sep="  ", flush=True)
-    if asked.write:
-        update(PAGE, MARK, tables(results, MEASURES if asked.cpu else MEASURES[:-1]))
+    drives = tuple(product(asked.scenes, SENSORS, (asked.seconds,), range(*asked.seeds)))
+    few = [missing[k : k + TOGETHER] for k in range(0, len(missing), TOGETHER)]
+    with Engine(asked.jobs) as engine:
+        for _, found in engine.results(partial(run, drives), few):
+            results |= {result["name"]: result for result in found}
+            asked.results.write_text(json.dumps(results))
+            for result in found:
+                print(result["name"], *(" ".join(_cells(result[sign])) for sign in SIGNS), sep="  ", flush=True)
 
 
 if __name__ == "__main__":

@@ -5,9 +5,14 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 from modt import host
 from modt.cli import options
+
+if TYPE_CHECKING:
+    from modt.config.mounted_sensor import MountedSensor
+    from modt.sources.live.live_stream import LiveStream
 
 
 def add_parser(commands: options.Commands) -> None:
@@ -50,9 +55,13 @@ def run(arguments: argparse.Namespace) -> int:
     ]
     if arguments.source is not None and not config.sensors:
         found += checks.sensor(lambda: live_source(arguments.source, cores)[0], config=config)
+
+    def opened(mounted: MountedSensor) -> LiveStream:
+        """The live stream of one of the profile's sensors."""
+        return live_sensors([mounted], arguments.source or "", cores)[0]
+
     for mounted in config.sensors:
-        opened = partial(lambda sensor: live_sensors([sensor], arguments.source or "", cores)[0], mounted)
-        of_sensor = checks.sensor(opened, config=assembly.sensor_profile(mounted))
+        of_sensor = checks.sensor(partial(opened, mounted), config=assembly.sensor_profile(mounted))
         found += [replace(finding, subject=f"{mounted.name} {finding.subject}") for finding in of_sensor]
     for finding in found:
         print(finding)

@@ -29,6 +29,18 @@ def test_a_difference_is_bold_where_its_interval_excludes_zero(difference, text)
     assert sensitivity.summary(np.array(difference, float)) == text
 
 
+def test_what_the_page_says_is_kept_but_for_results_and_changed_values(monkeypatch):
+    measures = sensitivity.MEASURES[:-1]
+    first, second, third = (constant.name for constant in CONSTANTS[:3])
+    known = {first: ["**+1.0**", "0", "+3", "0", "-0.1", "0"], second: ["refused"] * 6, third: ["**+2.0**"] * 6}
+    page = sensitivity.tables(known, measures, 2)
+    assert sensitivity.effects_on_page(page, len(measures)) == known
+    assert [name for name in re.findall(r"`(\S+)`", page) if name in known] == [third, first, second]
+    changed = sensitivity.with_value(MethodTuning(), CONSTANTS[1].path, 2 * CONSTANTS[1].value)
+    monkeypatch.setattr(sensitivity.tuning, "MethodTuning", lambda: changed)
+    assert set(sensitivity.effects_on_page(page, len(measures))) == {first, third}
+
+
 def test_the_page_shows_the_shipped_values():
     stages = re.split(r"^### ", sensitivity.PAGE.read_text(), flags=re.MULTILINE)[2:]
     shown = {}
