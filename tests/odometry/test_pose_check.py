@@ -132,3 +132,12 @@ def test_parts_of_walls_that_move_with_the_sensor_say_nothing_of_its_pose(n_rest
     moved_m = np.repeat([wrong_m, 0.5], [n_resting, 12])
     assert not check.check_drift(0.0, static_tracks(kdop), pose(0.0, 0.0, 0.0))
     assert check.check_drift(1.0, static_tracks(kdop + moved_m[:, None] * ALONG), pose(0.5, 0.0, 0.0)) == drifted
+
+
+@pytest.mark.parametrize(
+    ("off_m", "turned_rad", "convinced"), [(0.05, 0.004, False), (0.3, 0.0, True), (0.0, 0.1, True)]
+)
+def test_few_landmarks_in_place_refute_no_pose_that_registration_confirms(off_m, turned_rad, convinced):
+    given = pose(3.0, 1.0, 0.5)
+    registered = given @ pose(off_m, 0.0, turned_rad)
+    assert PoseCheck().convinces(given, registered, n_known=21, n_near=3, n_near_registered=7) == convinced

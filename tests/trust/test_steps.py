@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from modt.geometry import rotation_zyx
 from modt.profile import load
 from modt.trust.ground import GroundCheck
 from modt.trust.returns import BANDS, ReturnsCheck
@@ -59,6 +60,31 @@ def test_a_step_other_than_the_one_that_was_taken_for_back_is_reported():
         phrase = ground.look(height_m)
     assert not phrase
     assert ground.look(0.6)
+
+
+def among_walls(time_s, pitch_deg, plane):
+    """The level sweep of a pitched sensor 0.5 m above a floor amid walls; its lowest beam points 7 deg down."""
+    elevation, bearing = np.meshgrid(np.deg2rad(np.linspace(-7, 30, 60)), np.linspace(-np.pi, np.pi, 400))
+    ray = np.stack([np.cos(elevation) * np.cos(bearing), np.cos(elevation) * np.sin(bearing), np.sin(elevation)])
+    R_level_sensor = rotation_zyx(0.0, np.deg2rad(pitch_deg), 0.0)
+    x, y, z = R_level_sensor @ ray.reshape(3, -1)
+    to_floor_m = np.where(z < 0, -0.5 / np.minimum(z, -1e-9), np.inf)
+    to_wall_m = 5.0 / np.maximum(np.abs(x), np.abs(y))
+    points = (np.minimum(to_floor_m, to_wall_m) * np.stack([x, y, z])).T.astype(np.float32)
+    frame = Frame(0, time_s, points, R_level_sensor=R_level_sensor)
+    return sample(frame, np.eye(4), SENSOR, plane)
+
+
+def test_the_lowest_returns_of_a_swaying_sensor_are_no_ground_where_all_beams_are_above_it():
+    plane = np.array([-0.5, 0.0, 0.0])
+    sweeps = [among_walls(0.1 * k, pitch_deg, plane) for k, pitch_deg in enumerate((6.0, -6.0, 6.0))]
+    assert all(0.1 < sweep.below_view.mean() < 0.5 for sweep in sweeps)
+    check = GroundCheck(GroundTuning(), 0.5)
+    for _ in range(8):
+        check.learn(sweeps[0])
+    assert check.known
+    check.look(sweeps[-1], [(sweeps[0], sweeps[1], sweeps[2])], BACK_LOOKS)
+    assert not check.phrase
 
 
 class Counted(ReturnsCheck):

@@ -83,8 +83,15 @@ class PoseCheck:
         """Whether enough of the landmarks are where the pose says, or too few are known to tell."""
         return n_known < self._tuning.min_landmarks or n_near >= self._tuning.agreeing_share * n_known
 
-    def convinces(self, n_known: int, n_near: int, n_near_registered: int) -> bool:
-        """Whether registration explains the frame, and clearly better than the pose."""
+    def convinces(
+        self, T_given: Float64, T_registered: Float64, n_known: int, n_near: int, n_near_registered: int
+    ) -> bool:
+        """Whether registration explains the frame by another pose (4, 4), and clearly better than the given one.
+
+        A swaying sensor sees few landmarks in their places by any pose.
+        """
+        if self._alike(inverse(T_given) @ T_registered, np.eye(4)):
+            return False
         least = max(self._tuning.min_landmarks, self._tuning.convincing_share * n_known)
         return n_near_registered >= least and n_near_registered > self._tuning.better * n_near
 
@@ -165,12 +172,16 @@ class PoseCheck:
         from_s, T_given_before, T_registered_before = self._compared_from
         given = inverse(T_given_before) @ T_given
         difference = inverse(given) @ inverse(T_registered_before) @ T_registered
-        far_m = float(np.hypot(difference[0, 3], difference[1, 3]))
-        most_rad = self._tuning.motion_rad + self._tuning.turn_share * abs(yaw_of(given))
-        if self._exceeds_tolerance(far_m, given) or abs(yaw_of(difference)) > most_rad:
+        if not self._alike(difference, given):
             self._compared_from = now_s, T_given, T_registered
         elif now_s - from_s >= self._tuning.agree_s:
             self.doubted = False
+
+    def _alike(self, difference: Float64, motion: Float64) -> bool:
+        """Whether the difference (4, 4) of two poses after a motion (4, 4) is within the tolerance."""
+        far_m = float(np.hypot(difference[0, 3], difference[1, 3]))
+        most_rad = self._tuning.motion_rad + self._tuning.turn_share * abs(yaw_of(motion))
+        return not self._exceeds_tolerance(far_m, motion) and abs(yaw_of(difference)) <= most_rad
 
 
 def _places(kdop: Float64) -> Float64:

@@ -118,7 +118,8 @@ class PoseEstimator:
         placement = self._register(sweep, landmarks)
         registered = Located(placement, sweep.observe(placement))
         _, n_near_registered = check.count_near(landmarks, registered.observations)
-        if not drifted and not check.convinces(n_known, n_near, n_near_registered):
+        poses = given_placement.T_world_sensor, placement.T_world_sensor
+        if not drifted and not check.convinces(*poses, n_known, n_near, n_near_registered):
             return located
         self._landmarks.hold(check.begin(now_s))
         return registered

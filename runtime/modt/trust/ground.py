@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from modt.trust.sample import RINGS, SECTORS, Sample, Three
+from modt.trust.sample import CELLS, RINGS, SECTORS, Sample, Three
 from modt.trust.tuning import GroundTuning
 from modt.types import Float32, Float64, Int
 
-MIN_CELLS = 12
+MINCELLS = 12
 """Fewest cells in which the ground of two sweeps is compared."""
 ROUNDS = 2
 """Rounds of a fit; each leaves out the cells that are off by more than twice the median."""
@@ -67,8 +67,8 @@ class GroundCheck:
     def learn(self, sample: Sample) -> None:
         """Follow the ground of a sweep."""
         cells = np.flatnonzero(np.isfinite(sample.lowest_m))
-        if len(cells) >= MIN_CELLS:
-            off_m = sample.lowest_m.take(cells) - self.plane @ _CELLS.take(cells, axis=1)
+        if len(cells) >= MINCELLS:
+            off_m = sample.lowest_m.take(cells) - self.plane @ CELLS.take(cells, axis=1)
             self.plane = self.plane + self._tuning.gain * _fitted(cells, off_m)
             on_it = float(np.sort(np.abs(off_m))[len(cells) // 3]) < KNOWN_M
             below = self.plane[0] < LEAST_SHARE * self._profile_z_m
@@ -134,9 +134,9 @@ class GroundCheck:
     def _from_plane(self, sample: Sample) -> Float64:
         """Plane (3,) by which most cells of a sweep are off the known ground; OUT_OF_VIEW if few have any."""
         cells = np.flatnonzero(np.isfinite(sample.lowest_m))
-        if len(cells) < MIN_CELLS:
+        if len(cells) < MINCELLS:
             return OUT_OF_VIEW
-        return _fitted(cells, sample.lowest_m.take(cells) - self.plane @ _CELLS.take(cells, axis=1))
+        return _fitted(cells, sample.lowest_m.take(cells) - self.plane @ CELLS.take(cells, axis=1))
 
     def _add_steps(self, threes: Sequence[Three]) -> None:
         """Add the steps of the ground within three sweeps each, the greatest first.
@@ -206,15 +206,15 @@ def _tilt_deg(plane: Float64) -> float:
 def _moved_between(before: Sample, after: Sample) -> Float64:
     """Plane (3,) by which most of the cells with ground in both sweeps moved.
 
-    Where few cells have ground in both, it is OUT_OF_VIEW if many cells of the sectors that the second one sees had
-    ground in the first one, else zero.
+    Where few cells have ground in both, it is OUT_OF_VIEW if many cells in view of the second one had ground in the
+    first one, else zero.
     """
     ground = np.isfinite(before.lowest_m)
     both = np.flatnonzero(ground & np.isfinite(after.lowest_m))
-    if len(both) >= MIN_CELLS:
+    if len(both) >= MINCELLS:
         return _fitted(both, after.lowest_m.take(both) - before.lowest_m.take(both))
-    expected = ground.reshape(SECTORS, RINGS)[after.seen]
-    return OUT_OF_VIEW if np.count_nonzero(expected) > 2 * MIN_CELLS else np.zeros(3)
+    expected = (ground & ~after.below_view).reshape(SECTORS, RINGS)[after.seen]
+    return OUT_OF_VIEW if np.count_nonzero(expected) > 2 * MINCELLS else np.zeros(3)
 
 
 def _moved_at_once(before: Sample, between: Sample, after: Sample) -> Float64:
@@ -224,7 +224,7 @@ def _moved_at_once(before: Sample, between: Sample, after: Sample) -> Float64:
     already, so each cell is taken where it moved farther. Of a slope that is driven over, about half counts.
     """
     cells = np.flatnonzero(np.isfinite(before.lowest_m) & np.isfinite(between.lowest_m) & np.isfinite(after.lowest_m))
-    if len(cells) < MIN_CELLS:
+    if len(cells) < MINCELLS:
         return _moved_between(before, after)
     first_m = between.lowest_m.take(cells) - before.lowest_m.take(cells)
     second_m = after.lowest_m.take(cells) - between.lowest_m.take(cells)
@@ -239,7 +239,7 @@ def _fitted(cells: Int, values: Float32 | Float64) -> Float64:
     if median < NOTHING_M:
         return plane
     heights = values.astype(np.float64)
-    places = _CELLS.take(cells, axis=1)
+    places = CELLS.take(cells, axis=1)
     for _ in range(ROUNDS):
         close = places * (off <= 2 * median)
         plane = np.linalg.solve(close @ places.T + _RIDGE, close @ heights)
@@ -248,14 +248,4 @@ def _fitted(cells: Int, values: Float32 | Float64) -> Float64:
     return np.asarray(plane)
 
 
-def _cell_centres() -> Float64:
-    """(3, n) rows 1, x, y of the centres of the cells."""
-    bearing = (np.arange(SECTORS) + 0.5) * (2 * np.pi / SECTORS) - np.pi
-    range_m = np.arange(RINGS) + 0.5
-    x = np.outer(np.cos(bearing), range_m).ravel()
-    y = np.outer(np.sin(bearing), range_m).ravel()
-    return np.stack([np.ones(len(x)), x, y])
-
-
-_CELLS = _cell_centres()
 _RIDGE = 1e-6 * np.eye(3)

@@ -29,6 +29,17 @@ RINGS = 15
 """Rings of a metre in which the lowest point of each sector is kept."""
 
 
+def _cell_centres() -> Float64:
+    """Rows 1, x, y of the centres of the cells."""
+    bearing = (np.arange(SECTORS) + 0.5) * (2 * np.pi / SECTORS) - np.pi
+    range_m = np.arange(RINGS) + 0.5
+    x = np.outer(np.cos(bearing), range_m).ravel()
+    y = np.outer(np.sin(bearing), range_m).ravel()
+    return np.stack([np.ones(len(x)), x, y])
+
+
+CELLS = _cell_centres()
+"""(3, SECTORS x RINGS) rows 1, x, y of the centres of the cells [m, level sensor frame]."""
 _SPREAD = np.linspace(0.0, 1.0, SAMPLE)
 
 
@@ -79,9 +90,11 @@ class Sample:
     @property
     def tangent_in_sensor(self) -> Float32:
         """(c,) tangents of the elevations of the returns in the sensor's own frame."""
-        if self.R_level_sensor is None:
-            return np.asarray(self.xyz[2] / self.range_m)
-        x, y, z = self.R_level_sensor.T.astype(np.float32) @ self.xyz
+        return self._tangents_in_sensor(self.xyz)
+
+    def _tangents_in_sensor(self, xyz: Float32) -> Float32:
+        """(n,) tangents of the elevations of points (3, n) of the level frame in the sensor's own frame."""
+        x, y, z = xyz if self.R_level_sensor is None else self.R_level_sensor.T.astype(np.float32) @ xyz
         return np.asarray(z / np.sqrt(x * x + y * y))
 
     @cached_property
@@ -111,14 +124,24 @@ class Sample:
     def lowest_m(self) -> Float32:
         """(SECTORS x RINGS,) z of the lowest return of each cell near the sensor [m, level sensor frame].
 
-        It is infinite in a cell without returns.
+        It is infinite in a cell without returns, and where the ground is below all beams of a tilted sensor.
         """
         reach_m = np.clip(HEIGHTS * abs(self.plane[0]), *GROUND_M)
         near = np.flatnonzero(self.range_m < reach_m)
         cell = self.sector.take(near) * RINGS + self.range_m.take(near).astype(np.int64)
         lowest_m = np.full(SECTORS * RINGS, np.inf, np.float32)
         np.minimum.at(lowest_m, cell, self.xyz[2].take(near))
+        lowest_m[self.below_view] = np.inf
         return lowest_m
+
+    @cached_property
+    def below_view(self) -> Bool:
+        """(SECTORS x RINGS,) whether the ground in the middle of a cell is below all beams of a tilted sensor."""
+        if self.R_level_sensor is None:
+            return np.zeros(SECTORS * RINGS, np.bool_)
+        ground = np.stack([CELLS[1], CELLS[2], self.plane @ CELLS]).astype(np.float32)
+        below: Bool = self._tangents_in_sensor(ground) < self.tangent_in_sensor.min(initial=np.inf)
+        return below
 
 
 Three = tuple[Sample, Sample, Sample]
