@@ -199,7 +199,7 @@ def silent(levels: list[TrustLevel], pair: tuple[Episode, Episode], period_s: fl
 
 
 def stuck(levels: list[TrustLevel], pair: tuple[Episode, Episode], period_s: float) -> list[str]:
-    """What is to be said of a pair after which the trust is not good again; empty if it is."""
+    """Report of a pair after which the trust does not return to good; empty if it does."""
     after = levels[max(e.end for e in pair) + round(BACK_S / period_s) :]
     late = sum(level != TrustLevel.GOOD for level in after)
     return [f"not good in {late} of {len(after)} frames after both"] if late else []

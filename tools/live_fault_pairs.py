@@ -260,7 +260,7 @@ def started(folder: Path) -> bool:
 
 
 def tried(frames: Sequence[Frame], pair: Sequence[Episode]) -> list[str] | None:
-    """What a live run with a pair of faults does not keep; None if the packets were late, so it does not count."""
+    """Requirements that a live run with a pair of faults breaks; None if late packets make it worthless."""
     with tempfile.TemporaryDirectory(prefix="modt-pairs-") as name:
         folder = Path(name) / "run"
         packets, poses = free_ports(2)

@@ -36,7 +36,7 @@ class SensorPart:
 
 
 class JointView:
-    """What several sensors see together.
+    """Joint view of several sensors.
 
     The sweeps of a frame differ in their stamps, and a sweep takes time itself. So the proposals of each are moved to
     the stamp of the frame, by the motion of the robot in the frame before.

@@ -52,7 +52,7 @@ class SegmentationStage(Protocol):
 
 
 class ViewStage(Protocol):
-    """What the sensors of a robot see of a frame: the frame made level, and its proposals."""
+    """Views of the sensors of a robot on a frame: the frame made level, and its proposals."""
 
     def level(self, frame: Frame) -> Frame:
         """The frame in the level frame in which the stages work."""

@@ -1,4 +1,4 @@
-"""What is published of a frame: objects of a class, what moves, and what may be a person."""
+"""Published objects of a frame: those of a class, those that move, and those that may be persons."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class PublishedObjects:
 
 
 def published_objects(result: FrameResult, background: bool = False) -> PublishedObjects:
-    """What is published of a frame; with `background` everything in view."""
+    """Published objects of a frame; with `background` everything in view."""
     tracks = result.tracks
     kind = kinds(result)
     rows = np.flatnonzero(tracks.observed & (background | (kind > 0)))

@@ -1,4 +1,4 @@
-"""What is held against a live source, and the trust of a run."""
+"""Findings about a live source, and the trust of a run."""
 
 import pytest
 

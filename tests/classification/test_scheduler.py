@@ -34,7 +34,7 @@ def cost_model(max_points=400, slow=1.0):
 
 @given(counts=COUNTS, calls=st.none() | st.integers(1, 5), seed=st.integers(0, 100))
 def test_every_track_is_served_although_new_ones_keep_coming(counts, calls, seed):
-    """By a number of calls, or by the CPU time of the largest one."""
+    """Limits by a number of calls, or by the CPU time of the largest one."""
     _, proposals = blobs(counts, seed)
     tracks = new_tracks(proposals)
     cost = cost_model()

@@ -271,7 +271,7 @@ def _blocks_end(raw):
 
 @dataclass
 class Judgement:
-    """What was read of a damaged recording.
+    """Frames and counts read of a damaged recording.
 
     Attributes:
         given, read: number of sweeps that other readers give, and of those that were read.

@@ -72,7 +72,7 @@ def summary(result: FrameResult) -> dict[str, Any]:
 
 
 def path(mode: str) -> Path:
-    """Where the golden replay of a mode is kept."""
+    """File of the golden replay of a mode."""
     return FOLDER / f"street-{SENSOR}-{mode}.jsonl"
 
 

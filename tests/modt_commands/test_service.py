@@ -9,7 +9,7 @@ from modt_commands.service import drop_ins
 from tests.cli.commands import refusal
 
 PREFIX = ("--prefix", "/opt/modt")
-"""Where the tests run may be a folder that a service cannot see."""
+"""The folder where the tests run may be one that a service cannot see."""
 
 
 def content(root):

@@ -95,7 +95,7 @@ def test_poses_wrong_since_before_anything_was_seen_are_doubted():
 
 DIRECTION_RAD = np.pi / 4 * np.arange(8)
 ALONG, ACROSS = np.cos(DIRECTION_RAD), np.sin(DIRECTION_RAD)
-"""What a metre along x and along y adds to each side of a k-DOP [m]."""
+"""Shift that a metre along x and along y adds to each side of a k-DOP [m]."""
 
 
 @pytest.mark.parametrize(("step_m", "way_m", "drifted"), [(0.1, 0.0, False), (0.3, 0.0, True), (0.3, 10.0, False)])

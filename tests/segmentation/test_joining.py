@@ -17,7 +17,7 @@ def box_of(xyz):
 
 
 def seen(*parts, cut=0, extra=3):
-    """What a sensor sees: point sets (3, n), and some points of the ground after them."""
+    """View of a sensor: point sets (3, n), and some points of the ground after them."""
     count = np.array([part.shape[1] for part in parts], np.int64)
     xyz = np.concatenate([*parts, np.zeros((3, 0))], axis=1).astype(np.float32)
     n = xyz.shape[1]

@@ -104,7 +104,7 @@ def test_a_head_that_turns_twice_as_fast_is_the_same_sensor():
 @pytest.mark.parametrize("name", ["hdl-32e", "vlp-16", "os1-64"])
 @pytest.mark.parametrize("way_m", [0.5, 0.8, 1.2])
 def test_sweeps_that_were_compensated_for_a_drive_are_of_their_sensor(name, way_m):
-    """What a vehicle drives in a sweep moves the beams of each bearing by another angle."""
+    """The way that a vehicle drives in a sweep moves the beams of each bearing by another angle."""
     sweep = recording(name).sweeps[0].copy()
     sweep[:, 0] -= way_m * (np.arctan2(sweep[:, 1], sweep[:, 0]) / (2 * np.pi) + 0.5)
     assert recognise(sweep, profile.load(name)).differences == ()

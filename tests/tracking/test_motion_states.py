@@ -1,4 +1,4 @@
-"""What moves is told from what only seems to: surfaces behind others, what sways or flickers, a turning robot."""
+"""Movers are told from what only seems to move: surfaces behind others, what sways or flickers, a turning robot."""
 
 import numpy as np
 import pytest

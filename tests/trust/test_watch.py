@@ -162,7 +162,7 @@ def test_a_turn_that_registration_takes_for_a_motion_is_reported_and_withdrawn(s
 
 
 def test_a_turn_explains_the_points_that_a_broken_sweep_before_could_have_seen():
-    """Of its obstacles only those count that the turn brings into view of the sweep before."""
+    """Only those of its obstacles count that the turn brings into view of the sweep before."""
     points = drive("street")[ONSET].points
     broken = points[bearing(points) > -1.5]
     plane = np.array([-load(SENSOR).sensor.height_m, 0.0, 0.0])

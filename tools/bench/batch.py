@@ -174,7 +174,7 @@ class Bench:
 
 
 def _written(out: Path) -> dict[str, int]:
-    """When each committed run of a dataset was written [ns]."""
+    """Time at which each committed run of a dataset was written [ns]."""
     runs = out / "runs"
     return {name: (runs / f"{name}.parquet").stat().st_mtime_ns for name in Dataset(str(out)).committed()}
 

@@ -157,7 +157,7 @@ def _in_mode(request: Any, mode: str) -> Any:
 
 
 def _description(request: Any) -> dict[str, Any]:
-    """What all runs of a dataset have in common."""
+    """Settings that all runs of a dataset have in common."""
     from modt import __version__, profile
 
     return {

@@ -41,7 +41,7 @@ class LevelStream:
 
     @property
     def reading(self) -> Reading:
-        """What was read."""
+        """Counts of what was read."""
         return self._stream.reading
 
     def __iter__(self) -> Iterator[Frame]:

@@ -1,4 +1,4 @@
-"""What people wear, carry, sit on and push, and what is taken for people, of random proportions."""
+"""Things that people wear, carry, sit on and push, and things that are taken for people, of random proportions."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def luggage(rng: Generator) -> Solids:
 
 
 def seat(rng: Generator, height: float) -> Solids:
-    """What a person sits on: a chair, a stool, a block or a bench."""
+    """Seat of a person: a chair, a stool, a block or a bench."""
     kind = rng.integers(4)
     tall = 0.44
     if kind == 0:
@@ -150,7 +150,7 @@ def cone(rng: Generator) -> Solids:
 
 
 def topped(rng: Generator) -> Solids:
-    """What is wide at the top and thin below: a letter box, a small sign, a lamp, or a clipped bush on its trunk."""
+    """Thing that is wide at the top only: a letter box, a small sign, a lamp, or a clipped bush on its trunk."""
     foot = rng.uniform(0.2, 0.7) if rng.random() < 0.6 else rng.uniform(0.7, 1.6)
     radius = rng.uniform(0.02, 0.1) if foot < 0.7 else 0.02
     semi = tuple((rng.uniform((0.15, 0.15, 0.25), (0.45, 0.4, 0.8)) / (1.0, 1.0, 2.0)).tolist())

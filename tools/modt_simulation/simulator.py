@@ -67,7 +67,7 @@ class Sector:
 
 @dataclass(frozen=True, slots=True)
 class Surfaces:
-    """What the rays of a sweep, or of a sector of it, meet first."""
+    """First hits of the rays of a sweep, or of a sector of it."""
 
     distance: Float32  # (B, A) true horizontal distance [m]; infinite without a surface
     material: UInt8  # (B, A) its material
@@ -91,7 +91,7 @@ class Surfaces:
 
 @dataclass(frozen=True, slots=True)
 class Returns:
-    """What a receiver makes of the rays of a sweep."""
+    """Returns of a receiver for the rays of a sweep."""
 
     distance: Float32  # (B, A) measured horizontal distance [m]
     signal: Float32  # (B, A) strength of the return, as in View; 0 for none
@@ -288,13 +288,13 @@ class Simulator:
         return frame, truth
 
     def _air(self, time_s: float) -> Air | None:
-        """What is in the air at a time, None while it is clear."""
+        """Particles in the air at a time, None while it is clear."""
         if self._weather is None or time_s < self._weather.from_s:
             return None
         return weather(self._weather, self.world, self.seed)
 
     def _surfaces(self, sector: Sector, time_s: float, depth: Float32) -> Surfaces:
-        """What the rays of a sector meet in a sweep; `depth` (B, A) is that of all columns, as in RayCaster.cast."""
+        """Hits of the rays of a sector in a sweep; `depth` (B, A) is that of all columns, as in RayCaster.cast."""
         T_world_sensor = self._ego_pose(time_s, sector.delay_s)
         solids = self.world.solids(time_s + sector.delay_s, T_world_sensor, self.sensor.max_range_m)
         solids = solids.widened_by_beam(self.sensor.beam_radius_m, self.sensor.divergence_rad)

@@ -64,7 +64,7 @@ class Echoes:
 
 
 class Air(Protocol):
-    """What is in the air.
+    """Particles in the air.
 
     Attributes:
         extinction_per_m: share of the light that is lost on a metre, everywhere.
@@ -287,7 +287,7 @@ def read_weather(text: str) -> Condition:
 
 
 def weather(condition: Condition, world: World, seed: int) -> Air:
-    """What is in the air of a world."""
+    """Particles in the air of a world."""
     strength = condition.values[0]
     if condition.name == "rain":
         return rain(strength)

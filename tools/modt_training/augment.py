@@ -30,7 +30,7 @@ GROUND_NOISE_M = 0.05
 GROUND_NOISE_SLOPE = 0.002
 """Growth of that deviation with the range [m/m]."""
 OCCLUSIONS = ("none", "side", "foot", "top", "post")
-"""What an occluder hides of a crop."""
+"""Part of a crop that an occluder hides."""
 OCCLUSION_SHARE = (0.5, 0.28, 0.1, 0.05, 0.07)
 """Share of the crops with each of these."""
 HIDDEN_SHARE = (0.1, 0.65)

@@ -201,7 +201,7 @@ class BoxStudent(nn.Module):
 
 @dataclass(frozen=True)
 class Model:
-    """What decides the posterior of a proposal of which the reflectance is not known.
+    """Scores that decide the posterior of a proposal of unknown reflectance.
 
     Attributes:
         network: the network.

@@ -207,7 +207,7 @@ def threshold(score: Float64, right: Bool) -> tuple[float, float, float]:
 
 @dataclass(frozen=True)
 class Request:
-    """What is to be trained.
+    """Choice of what is trained.
 
     Attributes:
         recordings, labels: paths; no labels where they lie beside the recordings.

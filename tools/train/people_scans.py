@@ -109,7 +109,7 @@ def _height(rng: Generator) -> float:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a person is, and who.
+    """Place and kind of a person.
 
     Attributes:
         x, y: place [m].
@@ -170,7 +170,7 @@ def _carry(builder: SceneBuilder, place: Place) -> None:
 
 
 def _with(belonging: Callable[[Generator, float], Solids], width_m: float) -> Way:
-    """Who stands with something, within a square of this width."""
+    """People who stand with something, within a square of this width."""
 
     def add(builder: SceneBuilder, place: Place) -> None:
         size = (width_m, width_m, place.height)
@@ -194,7 +194,7 @@ def _seated(builder: SceneBuilder, place: Place, size: tuple[float, float, float
 
 
 def _low(posture: Posture) -> Way:
-    """Who crouches, kneels, or is on the floor; only adults kneel."""
+    """People who crouch, kneel, or are on the floor; only adults kneel."""
 
     def add(builder: SceneBuilder, place: Place) -> None:
         height = max(place.height, 1.45) if posture == Posture.KNEEL else place.height

@@ -40,7 +40,7 @@ class Playback:
 
     @property
     def reading(self) -> Reading:
-        """What was read so far."""
+        """Counts of what was read so far."""
         return self._stream.reading
 
     def start(self) -> None:

@@ -146,7 +146,7 @@ class Stages:
             view.segmenter.leave_out(watch.dead_deg if is_level else ())
 
     def _findings(self) -> dict[str, Finding]:
-        """What is held against source and profile, and what the odometry holds against its poses."""
+        """Findings about the source, the profile and the given poses."""
         findings = dict(self.source_findings)
         recognition = self.chosen.recognition
         if self._failure is not None:

@@ -69,7 +69,7 @@ PERIOD_RATIO = 1.4
 
 
 def source_findings(health: Mapping[str, Any], before: Mapping[str, Any], nominal_s: float) -> dict[str, Finding]:
-    """What is held against a live source, by its health and the one before."""
+    """Findings about a live source, by its health and the one before."""
     findings = {}
     period_s = health["period_s"]
     if max(period_s / nominal_s, nominal_s / max(period_s, 1e-6)) > PERIOD_RATIO:

@@ -44,7 +44,7 @@ class SeenBoxes:
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What a frame shows of the R objects in it.
+    """Visible parts of the R objects in a frame.
 
     Attributes:
         rows: (R,) rows of the track table.

@@ -16,7 +16,7 @@ from modt.types import Bool, Float64, Int
 
 
 class Anchors(NamedTuple):
-    """Where tracks at rest were at a time: their ids (n,), ascending, and k-DOPs (n, 8), and the given pose."""
+    """Places of tracks at rest at a time: their ids (n,), ascending, and k-DOPs (n, 8), and the given pose."""
 
     time_s: float
     id: Int

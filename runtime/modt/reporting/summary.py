@@ -203,7 +203,7 @@ def _fault_lines(faults: dict[str, Any]) -> list[str]:
 
 
 def _read_lines(read: dict[str, Any]) -> list[str]:
-    """What was read, and what the points and poses are."""
+    """Counts of what was read, and the kinds of points and poses."""
     if not read:
         return []
     joined = f", {read['joined']} of them parts of turns" if read["joined"] else ""

@@ -61,7 +61,7 @@ class CdrReader:
         return self._bytes(self.count())
 
     def rest(self) -> memoryview:
-        """What follows, not copied."""
+        """Bytes that follow, not copied."""
         return self._message[self._at :]
 
     def doubles(self, n: int) -> Float64:

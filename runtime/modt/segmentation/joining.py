@@ -27,7 +27,7 @@ _NO_ROWS = np.zeros(0, np.int64)
 
 @dataclass(frozen=True, slots=True)
 class SensorProposals:
-    """What a sensor tells of a frame.
+    """View of a frame by one sensor.
 
     Attributes:
         proposals: in the common frame; their members are rows of the sensor's own points.

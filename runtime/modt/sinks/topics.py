@@ -34,7 +34,7 @@ class Topic:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TopicOptions:
-    """Which topics are published.
+    """Choice of the topics that are published.
 
     Attributes:
         prefix: begins the names.

@@ -41,7 +41,7 @@ TABLES = "SELECT name FROM sqlite_master WHERE type != 'index' AND (type != 'tab
 
 @dataclass(frozen=True, slots=True)
 class Listing:
-    """What a database lists.
+    """Contents of a database.
 
     Attributes:
         topics: name, type and encoding of each topic by its number.

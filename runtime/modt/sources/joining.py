@@ -79,7 +79,7 @@ def joint_frame(index: int, sweeps: Sweeps, sensors: Sequence[MountedSensor]) ->
 
 
 def joined_reading(parts: Sequence[Reading], alone: Counter[str]) -> Reading:
-    """What was read of all sensors. Numbers and lists are added; a text is that of the first sensor that has one."""
+    """Counts of all sensors together. Numbers and lists are added; of texts the first one counts."""
     total = Reading()
     for part in parts:
         for name in (field.name for field in fields(Reading)):
@@ -125,7 +125,7 @@ class JointStream:
 
     @property
     def reading(self) -> Reading:
-        """What was read so far."""
+        """Counts of what was read so far."""
         return joined_reading([stream.reading for stream in self._streams], self._alone)
 
     def __iter__(self) -> Iterator[Frame]:

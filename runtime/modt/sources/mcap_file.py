@@ -76,7 +76,7 @@ class Piece:
 
 @dataclass(slots=True)
 class Contents:
-    """What a file holds.
+    """Contents of a file.
 
     Attributes:
         schemas, channels: records by their numbers. The first of a number counts.

@@ -106,7 +106,7 @@ class Faults:
 
 @dataclass(slots=True)
 class Reading:
-    """What the latest pass over a stream has read."""
+    """Counts of what the latest pass over a stream has read."""
 
     messages: int = 0  # messages, packets or files of sweeps
     sweeps: int = 0  # sweeps that they hold, usable or not
@@ -129,7 +129,7 @@ class Stream(Protocol):
 
     @property
     def reading(self) -> Reading:
-        """What was read so far."""
+        """Counts of what was read so far."""
 
     def __iter__(self) -> Iterator[Frame]:
         """Yield the frames; faults are added to `faults` on the way."""

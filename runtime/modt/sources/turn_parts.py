@@ -35,7 +35,7 @@ CLOCKWISE = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Arc:
-    """What a message covers, counter-clockwise from `low_rad` on [rad]."""
+    """Bearings that a message covers, counter-clockwise from `low_rad` on [rad]."""
 
     low_rad: float
     extent_rad: float

@@ -22,7 +22,7 @@ SAME_M = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Viewpoints:
-    """What the headers of a folder tell.
+    """Sensor positions by the headers of a folder.
 
     Attributes:
         poses: (4, 4) T_world_sensor by frame; empty if there are none, or all are the same.

@@ -32,7 +32,7 @@ VELOCITY = 2
 
 
 class Step(NamedTuple):
-    """What a time step does to all tracks alike."""
+    """Effect of a time step, alike for all tracks."""
 
     dt_s: float
     starts: float  # probability that a track at rest starts

@@ -1,4 +1,4 @@
-"""What the first sweeps of a source show, without any history."""
+"""Checks of the first sweeps of a source, without any history."""
 
 from __future__ import annotations
 

@@ -66,7 +66,7 @@ class ReturnsCheck:
         self._usual += gain * (self._count(sample) - self._usual)
 
     def loss(self, samples: Sequence[Sample]) -> Loss | None:
-        """What is missing in the last of the sweeps since the last look; None if nothing is, or nothing is known."""
+        """Missing part of the last of the sweeps since the last look; None if nothing is, or nothing is known."""
         if self._span is None:
             return None
         least = MIN_POINTS * samples[-1].weight

@@ -1,4 +1,4 @@
-"""What stood still must stand where the pose says: obstacles of two sweeps in one log-polar grid.
+"""Check that what stood still is where the pose says: obstacles of two sweeps in one log-polar grid.
 
 A turn of the sensor shifts the grid along the bearing, a scale of the ranges along the logarithm of the range, and a
 mirror reverses the bearing (Fourier-Mellin).

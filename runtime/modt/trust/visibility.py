@@ -52,7 +52,7 @@ class VisibilityEstimate:
         self.visibility_m = None if visible else CONTRAST / extinction_per_m
 
     def findings(self) -> dict[str, Finding]:
-        """What is held against the sweeps, by the name of the check."""
+        """Findings about the sweeps, by the name of the check."""
         if self.visibility_m is None or self.visibility_m >= self._tuning.degraded_m:
             return {}
         seen_m = self.visibility_m / 2  # the way there and back leaves 5 % of the light

@@ -27,7 +27,7 @@ UNCOVER = "uncover the sensor, or state the sector in sensor.blind_sectors_deg i
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What a check has against the sweeps at a look."""
+    """Objection of a check to the sweeps at a look."""
 
     level: TrustLevel
     cause: str

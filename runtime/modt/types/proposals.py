@@ -20,7 +20,7 @@ class Cut(IntFlag):
 
 
 class PointKind(IntEnum):
-    """What a point of a frame is. Every point has exactly one kind."""
+    """Kind of a point of a frame. Every point has exactly one kind."""
 
     MEMBER = 0  # belongs to a proposal
     GROUND = -1

@@ -1,4 +1,4 @@
-"""What a frame gives."""
+"""Result of a frame."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ class Robot:
         self.streams[sensor]._put(Sweep(stamp_s, points))
 
     def present(self, timeout_s=0.0):
-        """Which sensors have a sweep in the next frame; None without a frame."""
+        """Sensors that have a sweep in the next frame; None without a frame."""
         received = self.source.take(timeout_s)
         return None if received is None else tuple(each is not None for each in received.frame.sweeps)
 

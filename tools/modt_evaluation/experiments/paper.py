@@ -49,7 +49,7 @@ def figure(experiment: str, streams: str, variant: str, at: float | None, quanti
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """What the paper states about a figure, whose curve is an image there and known at few places.
+    """Statements of the paper about a figure, whose curve is an image there and known at few places.
 
     Attributes:
         words: what it is.
@@ -73,7 +73,7 @@ _TABLE_OF = {"fig9": "table4", "fig10": "table4", "fig11": "table4", "fig14": "t
 
 
 def marks(experiment: str, quantity: str) -> Iterator[Mark]:
-    """What the paper states about a quantity of a figure."""
+    """Statement of the paper about a quantity of a figure."""
     if quantity == "beta":
         yield from _betas(experiment)
     table = _TABLE_OF.get(experiment)

@@ -98,7 +98,7 @@ class JointLive:
 
     @property
     def reading(self) -> Reading:
-        """What was read so far."""
+        """Counts of what was read so far."""
         return joined_reading([stream.reading for stream in self._streams], self._alone)
 
     def health(self) -> dict[str, Any]:

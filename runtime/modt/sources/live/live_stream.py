@@ -169,7 +169,7 @@ class LiveStream:
 
     @property
     def reading(self) -> Reading:
-        """What was read so far."""
+        """Counts of what was read so far."""
         reception = self.reader.reception
         times = Counter({DESKEWED: self.skewed, COMPENSATED: self.sweeps - self.skewed})
         return Reading(reception.messages, self.sweeps, reception.joined, +times, frame_id=reception.frame_id)
@@ -301,7 +301,7 @@ class LiveStream:
 
 @dataclass(slots=True)
 class PlayedSince:
-    """When recordings that are played together begin.
+    """Begin of recordings that are played together.
 
     Attributes:
         start_s: time at which stamp 0 is due, by their clock [s]; None until one of them is read.

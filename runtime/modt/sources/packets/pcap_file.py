@@ -52,7 +52,7 @@ SEARCHED_BYTES = 1 << 22
 
 
 def _flaw(numbers: tuple[int, ...] | None, at: int, found: int | None, *, sound: bool) -> str:
-    """What is wrong with the record at an offset, after which one was found or none."""
+    """Flaw of the record at an offset, after which one was found or none."""
     if found is None and (numbers is None or sound):
         return "truncated within the header of a record" if numbers is None else "truncated within a record"
     absurd = numbers is not None and numbers[2] > MAX_RECORD_BYTES
