@@ -146,7 +146,9 @@ def test_a_run_is_exported_and_judged_alike(tmp_path, capsys):
     assert here("replay", path, "--labels", "--quiet", "--out", tmp_path / "run") == 0
     for task, field in (("detection", "attribute_name"), ("tracking", "tracking_id")):
         target = tmp_path / f"{task}.json"
+        capsys.readouterr()
         assert here("export", tmp_path / "run", f"--nuscenes-{task}", target) == 0
+        assert capsys.readouterr().out == f"5 frames: {target}\n"
         written = json.loads(target.read_text())
         assert len(written["results"]) == 5
         rows = [row for rows in written["results"].values() for row in rows]

@@ -229,6 +229,7 @@ def write_parquet(export: Export, target: Path, constants: Mapping[str, str]) ->
 def _nuscenes(export: Export, target: Path, task: str) -> None:
     """Write nuScenes' results of a task."""
     results = results_of(scene_of(export.run.stream), export.run.mount, export.results())
+    export.n_frames = len(results)  # the key frames alone
     with writing(target):
         target.write_text(json.dumps(submission(results, task)), encoding="utf-8")
 
