@@ -7,7 +7,7 @@ from modt.classes import ObjectClass
 from modt.config import TrackingConfig
 from modt.types import MotionState, PointKind
 from tests.tracking.test_sight import scene, wall
-from tests.tracking.tracking_scenes import Follower, box, driving, frame_of
+from tests.tracking.tracking_scenes import EYE, Follower, box, driving, frame_of
 
 PERIOD_S = 0.1
 
@@ -140,6 +140,20 @@ def test_a_surface_between_what_hides_it_does_not_move(hidden, moves):
         tracks = follower.follow(frame, proposals)
         follower.confirm([], [])
     assert bool(tracks.motion[tracks.hits.argmax()] == MotionState.MOVING) == moves
+
+
+@pytest.mark.parametrize(("step_m", "state"), [(0.15, "MOVING"), (0.0, "STILL")])
+def test_who_walks_beside_what_moves_along_is_known_to_move_before_a_persons_length_is_gone(step_m, state):
+    follower = Follower()
+    for index in range(8):
+        y = step_m * index
+        boxes = [box(6, y, 0.5, 0.5), box(6, y + 0.65, 0.6, 0.6)]
+        _, proposals = scene(boxes, [PointKind.MEMBER] * 2)
+        frame, _ = frame_of(boxes, index, EYE, points=3000)
+        tracks = follower.follow(frame, proposals)
+        follower.set_class(0, ObjectClass.PEDESTRIAN)
+        follower.confirm([], [])
+    assert MotionState(tracks.motion[0]).name == state
 
 
 def test_the_papers_filter_tells_the_velocity_alone():

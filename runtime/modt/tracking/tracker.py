@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from modt.class_sizes import IS_PERSON, WHOLE_SIZE_M
+from modt.class_sizes import IS_PERSON, IS_WALKER, WHOLE_SIZE_M
 from modt.classes import PERSON_HEIGHT_M, ObjectClass
 from modt.config import TrackingConfig
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
@@ -255,15 +255,17 @@ class Tracker:
     def _weighed(self, log_ratio: Float64, frame: Associated, nearest: Float32 | None) -> Float64:
         """Evidence of moving (R,) of the matched tracks, less where a changing view explains it.
 
-        Where a proposal is bounded by what is nearer, or goes on there, its ends may move while the object rests.
-        A flat and low proposal of a background track is no evidence of motion. Evidence of rest counts in any case.
+        Where a proposal is bounded by what is nearer, or goes on there, its ends may move while the object rests. The
+        evidence of walkers is weak there already, as their positions are uncertain (`Hiding.loosened`). A flat and
+        low proposal of a background track is no evidence of motion. Evidence of rest counts in any case.
         """
         tuning = self._evidence
         length_m, width_m, height_m = frame.proposals.box[frame.matches.proposals, 3:6].T
         flat = (height_m < tuning.min_height_m) & (height_m < tuning.flat_height * length_m)
-        is_object = self.tracks.object_class[frame.matches.rows] != ObjectClass.BACKGROUND.value
+        object_class = self.tracks.object_class[frame.matches.rows]
+        is_object = object_class != ObjectClass.BACKGROUND.value
         weighed = np.where(flat & ~is_object, np.minimum(log_ratio, 0.0), log_ratio)
-        claims = (weighed > 0).nonzero()[0]
+        claims = ((weighed > 0) & ~IS_WALKER[object_class]).nonzero()[0]
         if nearest is None or not len(claims):
             return weighed
         compact = (length_m < tuning.max_compact_m) & (width_m > tuning.min_compact_width * length_m)

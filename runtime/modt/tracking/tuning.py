@@ -121,7 +121,7 @@ class MotionEvidenceTuning:
     Chosen on: simulated streets and aisles, by static things that were reported as moving."""
 
     object_weight: float = 0.5
-    """The same of a track whose class is not background, bounded on one side or both.
+    """The same of a track whose class is neither background nor that of a walker, bounded on one side or both.
     Chosen on: simulated streets, by the error of velocities."""
 
     max_compact_m: float = 1.2
