@@ -115,6 +115,12 @@ def test_boxes_that_are_cut_where_a_person_may_go_on_are_scored_as_bounds():
     assert_array_equal(without, by_size)
 
 
+def test_scores_are_the_same_whatever_the_nearest_range_of_the_profile():
+    features = np.random.default_rng(4).normal(size=(2, N_FEATURES))
+    whole_in_range, cut_in_range = (np.array([Cut.TOP, Cut.BOTTOM | near]) for near in (0, Cut.NEAR))
+    assert_array_equal(bound_features(features, whole_in_range), bound_features(features, cut_in_range))
+
+
 def test_features_of_crops_and_proposals_agree():
     frame = next(iter(SyntheticStream("street", "hdl-64e", 0.1, seed=4)))
     proposals = Segmenter(SegmentationConfig(), SENSOR, FieldOfView()).segment(frame.points)

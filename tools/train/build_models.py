@@ -23,7 +23,7 @@ from tools.train.build_crops import SPARSE, kitti_crops, own_crops, simulated_cr
 MODELS = Path(__file__).resolve().parents[2] / "models"
 WORLDS = 240
 """Simulated worlds of each kind."""
-NEAR_WORLDS = {1: 1200, 2: 220}
+NEAR_WORLDS = {1: 2400, 2: 220}
 """Seed and number of the worlds near the sensor, first for training, then for the card."""
 NEAR_STEPS = 4000
 """Training steps of the network for near crops."""

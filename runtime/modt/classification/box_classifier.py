@@ -59,7 +59,9 @@ BOUNDS_KEY = "box_bounds"
 # Definition of the features: fixed when a model is trained.
 N_FEATURES = 7
 """Number of features of a box."""
-N_BOUND_FEATURES = N_FEATURES + len(Cut)
+BOUND_FLAGS = Cut.TOP, Cut.BOTTOM, Cut.SIDE
+"""Sides whose cut is a feature. The nearest range is a choice of the profile and says nothing of the object."""
+N_BOUND_FEATURES = N_FEATURES + len(BOUND_FLAGS)
 """Number of features of a cut box."""
 PERSON_TOP_M = 2.0
 """Height above ground below which the view may have cut off a person's upper part [m]."""
@@ -135,8 +137,8 @@ def is_bound(features: Float64, cut: Int) -> Bool:
 
 
 def bound_features(features: Float64, cut: Int) -> Float64:
-    """(R, 11) features of cut boxes: (R, 7) features of boxes, and each flag of Cut (R,) in a column of its own."""
-    return np.column_stack([features, *((cut & side) > 0 for side in Cut)])
+    """(R, 10) features of cut boxes: (R, 7) features of boxes, and each of BOUND_FLAGS in (R,) flags of Cut."""
+    return np.column_stack([features, *((cut & side) > 0 for side in BOUND_FLAGS)])
 
 
 def proposal_features(proposals: Proposals, sensor: SensorConfig, beams: Beams | None = None) -> Float64:
