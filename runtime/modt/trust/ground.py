@@ -10,7 +10,7 @@ from modt.trust.sample import CELLS, RINGS, SECTORS, Sample, Three
 from modt.trust.tuning import GroundTuning
 from modt.types import Float32, Float64, Int
 
-MINCELLS = 12
+MIN_CELLS = 12
 """Fewest cells in which the ground of two sweeps is compared."""
 ROUNDS = 2
 """Rounds of a fit; each leaves out the cells that are off by more than twice the median."""
@@ -67,7 +67,7 @@ class GroundCheck:
     def learn(self, sample: Sample) -> None:
         """Follow the ground of a sweep."""
         cells = np.flatnonzero(np.isfinite(sample.lowest_m))
-        if len(cells) >= MINCELLS:
+        if len(cells) >= MIN_CELLS:
             off_m = sample.lowest_m.take(cells) - self.plane @ CELLS.take(cells, axis=1)
             self.plane = self.plane + self._tuning.gain * _fitted(cells, off_m)
             on_it = float(np.sort(np.abs(off_m))[len(cells) // 3]) < KNOWN_M
@@ -134,7 +134,7 @@ class GroundCheck:
     def _from_plane(self, sample: Sample) -> Float64:
         """Plane (3,) by which most cells of a sweep are off the known ground; OUT_OF_VIEW if few have any."""
         cells = np.flatnonzero(np.isfinite(sample.lowest_m))
-        if len(cells) < MINCELLS:
+        if len(cells) < MIN_CELLS:
             return OUT_OF_VIEW
         return _fitted(cells, sample.lowest_m.take(cells) - self.plane @ CELLS.take(cells, axis=1))
 
@@ -211,10 +211,10 @@ def _moved_between(before: Sample, after: Sample) -> Float64:
     """
     ground = np.isfinite(before.lowest_m)
     both = np.flatnonzero(ground & np.isfinite(after.lowest_m))
-    if len(both) >= MINCELLS:
+    if len(both) >= MIN_CELLS:
         return _fitted(both, after.lowest_m.take(both) - before.lowest_m.take(both))
     expected = (ground & ~after.below_view).reshape(SECTORS, RINGS)[after.seen]
-    return OUT_OF_VIEW if np.count_nonzero(expected) > 2 * MINCELLS else np.zeros(3)
+    return OUT_OF_VIEW if np.count_nonzero(expected) > 2 * MIN_CELLS else np.zeros(3)
 
 
 def _moved_at_once(before: Sample, between: Sample, after: Sample) -> Float64:
@@ -224,7 +224,7 @@ def _moved_at_once(before: Sample, between: Sample, after: Sample) -> Float64:
     already, so each cell is taken where it moved farther. Of a slope that is driven over, about half counts.
     """
     cells = np.flatnonzero(np.isfinite(before.lowest_m) & np.isfinite(between.lowest_m) & np.isfinite(after.lowest_m))
-    if len(cells) < MINCELLS:
+    if len(cells) < MIN_CELLS:
         return _moved_between(before, after)
     first_m = between.lowest_m.take(cells) - before.lowest_m.take(cells)
     second_m = after.lowest_m.take(cells) - between.lowest_m.take(cells)
