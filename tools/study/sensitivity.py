@@ -298,6 +298,8 @@ def main() -> None:
     options.add_argument("--write", action="store_true")
     asked = options.parse_args()
     results: dict[str, Any] = json.loads(asked.results.read_text()) if asked.results.exists() else {}
+    if asked.write and not results:
+        options.error(f"{asked.results} holds no results: measure a constant first, without --write")
     if asked.write:
         measures = MEASURES if asked.cpu else MEASURES[:-1]
         known = effects_on_page(PAGE.read_text(), len(measures)) | effects(results, len(measures))
