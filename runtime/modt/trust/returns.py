@@ -12,7 +12,8 @@ from modt.trust.tuning import ReturnsTuning
 from modt.types import Bool, Float64
 
 BANDS = 12
-"""Bands of elevation, of the same width in its tangent."""
+"""Bands of elevation in the sensor's own frame, of the same width in its tangent. In a level sweep of a robot that walks,
+the lowest returns of its tilted sweeps would be missing."""
 OUTER = 0.01
 """Share of the returns of the first sweep below the bands, and above them. Such returns count in the end bands."""
 AROUND = 10
@@ -59,7 +60,7 @@ class ReturnsCheck:
             n = sample.xyz.shape[1]
             if n < MIN_POINTS * BANDS:
                 return
-            tangent = np.sort(sample.xyz[2] / sample.range_m)
+            tangent = np.sort(sample.tangent_in_sensor)
             self._span = float(tangent[int(OUTER * n)]), float(tangent[int((1 - OUTER) * n)]) + 1e-3
             self._usual = self._count(sample)
         gain = min(elapsed_s / self._tuning.memory_s, 1.0)
@@ -151,7 +152,7 @@ class ReturnsCheck:
     def _count_anew(self, sample: Sample) -> Float64:
         assert self._span is not None
         low, high = self._span
-        steps = (sample.xyz[2] / sample.range_m - np.float32(low)) * np.float32(BANDS / (high - low))
+        steps = (sample.tangent_in_sensor - np.float32(low)) * np.float32(BANDS / (high - low))
         band = np.minimum(np.maximum(steps, 0), BANDS - 1).astype(np.int64)
         count = np.bincount(sample.sector * BANDS + band, minlength=SECTORS * BANDS)
         return np.asarray(sample.weight * count).reshape(SECTORS, BANDS)
