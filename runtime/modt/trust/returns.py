@@ -12,8 +12,8 @@ from modt.trust.tuning import ReturnsTuning
 from modt.types import Bool, Float64
 
 BANDS = 12
-"""Bands of elevation in the sensor's own frame, of the same width in its tangent. In a level sweep of a robot that walks,
-the lowest returns of its tilted sweeps would be missing."""
+"""Bands of elevation in the sensor's own frame, of the same width in its tangent. A level frame has returns below the
+lowest beam whenever a walking robot tilts, and none whenever it is level."""
 OUTER = 0.01
 """Share of the returns of the first sweep below the bands, and above them. Such returns count in the end bands."""
 AROUND = 10
