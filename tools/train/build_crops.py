@@ -53,8 +53,9 @@ SIMULATED: Mapping[str, Callable[..., Iterator[Scan]]] = {
     "worn": worn_scans,
 }
 """Sweeps of the kinds of worlds, by seeds."""
-SPARSE = ("vlp-16", "vlp-16", "mid-360")
-"""Sensors of few beams, or of few points a sweep."""
+FEW_BEAMS = ("vlp-16", "vlp-16", "mid-360")
+FEW_POINTS = ("mid-360", "mid-360", "vlp-16")
+"""Sensors of few beams and of few points a sweep, in turn."""
 SEEDS_APART = 100_000
 """Number of worlds between the first ones of two seeds."""
 

@@ -18,7 +18,15 @@ from pathlib import Path
 
 from modt import profile
 from tools.options import parser
-from tools.train.build_crops import SPARSE, kitti_crops, own_crops, simulated_crops, street_crops, synthetic_crops
+from tools.train.build_crops import (
+    FEW_BEAMS,
+    FEW_POINTS,
+    kitti_crops,
+    own_crops,
+    simulated_crops,
+    street_crops,
+    synthetic_crops,
+)
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
 WORLDS = 240
@@ -33,8 +41,11 @@ BARE_WORLDS = {3: 880, 4: 110}
 """Seed and number of the worlds without objects, first for training, then for the card."""
 PEOPLE_WORLDS = {5: 400, 7: 400, 6: 220}
 """Seed and number of the worlds of people in all postures, the last for the card, the others for training."""
-SPARSE_WORLDS = {12: 260}
-"""The same for sensors of few beams alone, for training."""
+SPARSE_WORLDS = {
+    "people": (12, 260, FEW_BEAMS),
+    "riders": (13, 240, FEW_POINTS),
+}
+"""Seed, number and sensors of further worlds of a kind, for training: what few beams show is mistaken most easily."""
 WORN_WORLDS = {10: 220, 11: 24}
 """Seed and number of the worlds of worn sensors, first for training, then for the card."""
 RIDER_WORLDS = {8: 220, 9: 60}
@@ -88,22 +99,23 @@ def further_crops(work: Path) -> None:
     ):
         for seed, worlds in worlds_of_seed.items():
             simulated_crops(work / f"{kind}-{seed}.npz", kind, worlds, seed)
-    for seed, worlds in SPARSE_WORLDS.items():
-        simulated_crops(work / f"people-{seed}.npz", "people", worlds, seed, SPARSE)
+    for kind, (seed, worlds, sensors) in SPARSE_WORLDS.items():
+        simulated_crops(work / f"{kind}-{seed}.npz", kind, worlds, seed, sensors)
     for seed, worlds in STREET_WORLDS.items():
         street_crops(work / f"street-{seed}.npz", worlds, seed)
 
 
-def train_further(crops: list[Path], work: Path, out: Path, steps: int) -> None:
+def train_further(crops: list[Path], work: Path, out: Path, steps: int, *options: str) -> None:
     """Train a model on worlds without objects and on worlds of people. Its own data sets are `crops`."""
+    sparse = {kind: work / f"{kind}-{seed}.npz" for kind, (seed, _, _) in SPARSE_WORLDS.items()}
     bare = [work / f"bare-{seed}.npz" for seed in BARE_WORLDS]
-    people = [work / f"people-{seed}.npz" for seed in (*SPARSE_WORLDS, *PEOPLE_WORLDS)]
-    riders = [work / f"riders-{seed}.npz" for seed in RIDER_WORLDS]
+    people = [sparse["people"], *(work / f"people-{seed}.npz" for seed in PEOPLE_WORLDS)]
+    riders = [sparse["riders"], *(work / f"riders-{seed}.npz" for seed in RIDER_WORLDS)]
     worn = [work / f"worn-{seed}.npz" for seed in WORN_WORLDS]
     streets = [work / f"street-{seed}.npz" for seed in STREET_WORLDS]
     data: list[str | Path] = ["--bare", *bare, "--people", *people, "--riders", *riders, "--worn", *worn]
     data += ["--streets", *streets, "--crops", *crops]
-    run("train_further", out, *data, "--steps", steps)
+    run("train_further", out, *data, "--steps", steps, *options)
 
 
 def train_near(crops: list[Path], work: Path, out: Path, licence: str) -> None:
@@ -147,7 +159,7 @@ def main() -> None:
         shipped.append(([real, placed], MODELS / "pointnet-kitti.onnx", KITTI_DATA, KITTI_LICENCE))
     for crops, out, data, licence in shipped:
         if args.further:
-            train_further(crops, args.work, out, FURTHER_STEPS)
+            train_further(crops, args.work, out, FURTHER_STEPS, "--keep-boxes")
             train_near(crops, args.work, out, licence)
         else:
             build(crops, args.work, out, args.steps, data, licence)

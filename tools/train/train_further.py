@@ -1,8 +1,8 @@
 """Train a model further: heaps, rows of scooters, and people in every posture (extra [train]).
 
-    python -m tools.train.train_further MODEL.onnx --bare BARE.npz HELD.npz --people PEOPLE.npz... HELD.npz
-                         --riders RIDERS.npz HELD.npz --worn WORN.npz HELD.npz --streets STREETS.npz...
-                         --crops CROPS.npz... [--steps N]
+    python -m tools.train.train_further MODEL.onnx --bare BARE.npz... HELD.npz --people PEOPLE.npz... HELD.npz
+                         --riders RIDERS.npz... HELD.npz --worn WORN.npz... HELD.npz --streets STREETS.npz...
+                         --crops CROPS.npz... [--keep-boxes] [--steps N]
 
 Streets have no heaps, few scooters, and their people stand and walk. A network that has seen nothing else takes a
 heap or a row of scooters for a car, and who sits or crouches for background. The network is trained on with six
@@ -11,8 +11,9 @@ have the labels of the simulator, and those of --crops, the data of the model, k
 gives them. A share of these is changed as worn sensors would measure them, and keeps the posterior of the unchanged.
 So the class frequencies that the posteriors assume hold on streets. Crops of that data that are as narrow and low as
 a person are drawn oftener: bins, plants, signs and posts of streets stay background. The box classifier
-is trained alike, without augmentation: the box of a car of which a part is cut off is the box of a heap. The model is
-replaced, and its card gets a section with the false objects, the people and the riders on the held data sets, on
+is trained alike, without augmentation: the box of a car of which a part is cut off is the box of a heap. One that has
+learnt these sweeps before is kept by --keep-boxes: to learn them again costs cars and people of real scans. The model
+is replaced, and its card gets a section with the false objects, the people and the riders on the held data sets, on
 which nothing is trained.
 """
 
@@ -67,8 +68,10 @@ from modt_training.fine_tuning import (
 )
 from tools.options import make_torch_deterministic, parser
 
+KEPT_SIZE = 384
+"""Number of crops of the data of the model of a step, which keep their posterior."""
 BARE_SIZE = 48
-"""Number of bare crops of a step, beside BATCH_SIZE crops that keep their posterior."""
+"""Number of bare crops of a step."""
 BARE_BATCHES = 160
 """Batches of augmented bare crops."""
 MIN_WORTH = 0.1
@@ -111,7 +114,7 @@ MAX_NARROW_TOP_M = 2.0
 """Greatest height of their top above ground: that of a person."""
 MAX_NARROW_M = 1.3
 """Greatest extent of their points along either axis."""
-RIDER_SIZE = 64
+RIDER_SIZE = 128
 """Number of crops of roads with rows of two-wheelers of a step."""
 RIDER_BATCHES = 200
 """Batches of such crops, half of them augmented."""
@@ -407,28 +410,26 @@ def _sources(name: str, data: Dataset) -> str:
 def main() -> None:
     options = parser(__doc__)
     options.add_argument("model", type=Path)
-    options.add_argument("--bare", type=Path, nargs=2, required=True, help="sweeps without objects; others, held out")
-    options.add_argument(
-        "--people", type=Path, nargs="+", required=True, help="sweeps of people; the last ones held out"
-    )
-    options.add_argument("--riders", type=Path, nargs=2, required=True, help="sweeps of riders; others, held out")
-    options.add_argument("--worn", type=Path, nargs=2, required=True, help="sweeps of worn sensors; others, held out")
+    sweeps = {"bare": "without objects", "people": "of people", "riders": "of riders", "worn": "of worn sensors"}
+    for kind, which in sweeps.items():
+        shown = f"sweeps {which}; the last ones held out"
+        options.add_argument(f"--{kind}", type=Path, nargs="+", required=True, help=shown)
     options.add_argument("--streets", type=Path, nargs="+", required=True, help="sweeps of simulated streets")
     options.add_argument("--crops", type=Path, nargs="+", required=True, help="data of the model")
+    options.add_argument("--keep-boxes", action="store_true", help="leave the box classifier as it is")
     options.add_argument("--steps", type=int, default=1800, help="of the training (default: %(default)s)")
     args = options.parse_args()
     make_torch_deterministic()
     started = time.process_time()
     before = Model.of(onnx.load(str(args.model)))
     data = load(*args.crops)
-    bare, held_bare = (load(path) for path in args.bare)
-    riders, held_riders = (load(path) for path in args.riders)
-    worn_sweeps, held_worn = (load(path) for path in args.worn)
-    people = load(*args.people[:-1])
-    held = Held(load(args.people[-1]), held_bare, held_riders, held_worn)
+    bare, people, riders, worn_sweeps = (
+        load(*paths[:-1]) for paths in (args.bare, args.people, args.riders, args.worn)
+    )
+    held = Held(*(load(paths[-1]) for paths in (args.people, args.bare, args.riders, args.worn)))
     streets = load(*args.streets)
     rng = np.random.default_rng(SEED)
-    kept = kept_examples(before, data, rng)
+    kept = replace(kept_examples(before, data, rng), size=KEPT_SIZE)
     others = [
         bare_examples(before, bare, rng),
         people_examples(before, people, rng),
@@ -439,15 +440,16 @@ def main() -> None:
         worn_examples(before, data, rng),
     ]
     after = train_network(before, kept, others, args.steps, SEED)
-    boxes = [
-        bare_boxes(bare),
-        people_boxes(people, rng),
-        street_boxes(streets),
-        narrow_boxes(before, data),
-        rider_boxes(riders, rng),
-        replace(street_boxes(worn_sweeps), size=BOX_WORN_SIZE),
-    ]
-    after = warier_of_cyclists(train_boxes(after, data, boxes, BOX_STEPS * args.steps, SEED))
+    if not args.keep_boxes:
+        boxes = [
+            bare_boxes(bare),
+            people_boxes(people, rng),
+            street_boxes(streets),
+            narrow_boxes(before, data),
+            rider_boxes(riders, rng),
+            replace(street_boxes(worn_sweeps), size=BOX_WORN_SIZE),
+        ]
+        after = warier_of_cyclists(train_boxes(after, data, boxes, BOX_STEPS * args.steps, SEED))
     first_sha256 = hashlib.sha256(args.model.read_bytes()).hexdigest()
     sha256 = save_model(args.model, after)
     seconds = time.process_time() - started

@@ -24,7 +24,8 @@ def test_one_command_trains_on_scans_of_ones_own(tmp_path, monkeypatch):
     monkeypatch.setattr(build_models, "NEAR_WORLDS", {1: 12, 2: 12})
     monkeypatch.setattr(build_models, "BARE_WORLDS", {3: 12, 4: 12})
     monkeypatch.setattr(build_models, "PEOPLE_WORLDS", {5: 6, 7: 6, 6: 6})
-    monkeypatch.setattr(build_models, "SPARSE_WORLDS", {12: 3})
+    sparse = {kind: (seed, 3, ("vlp-16",)) for seed, kind in enumerate(build_models.SPARSE_WORLDS, 12)}
+    monkeypatch.setattr(build_models, "SPARSE_WORLDS", sparse)
     monkeypatch.setattr(build_models, "RIDER_WORLDS", {8: 6, 9: 6})
     monkeypatch.setattr(build_models, "WORN_WORLDS", {10: 3, 11: 3})
     monkeypatch.setattr(build_models, "STREET_WORLDS", {900_000: 4, 900_500: 4})
