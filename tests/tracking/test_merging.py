@@ -25,6 +25,7 @@ BACKGROUND, CAR, PEDESTRIAN, CYCLIST = ObjectClass
 WHOLE, REAR, FRONT = (box(x, 3, length, 1.8, 1.5) for x, length in ((10, 4.2), (8.6, 1.4), (11.1, 2.0)))
 AHEAD = box(15, 3, 4.2, 1.8, 1.5)
 SLIM = box(11.1, 3, 0.6, 0.6, 1.5)
+TALLER = box(11.1, 3, 0.6, 0.6, 1.8, z=-0.85)
 POINTS = 80
 
 
@@ -67,11 +68,19 @@ def merged(tracks, boxes, rows):
         ([FRONT, WHOLE], [BACKGROUND, BACKGROUND], [FRONT, REAR], {}, False),  # the other is older
         ([WHOLE], [CAR], [REAR, SLIM], {}, True),  # may be a person
         ([WHOLE], [BACKGROUND], [REAR, SLIM], {}, False),
+        ([WHOLE], [CAR], [REAR, TALLER], {}, False),  # stands in an open door
     ],
 )
 def test_what_is_a_part(known, classes, seen, columns, is_part):
     groups, _ = merged(tracks_at(known, *classes, **columns), seen, range(len(known)))
     assert groups == ([[0, 1]] if is_part else [[0], [1]])
+
+
+@pytest.mark.parametrize(("points", "is_part"), [(19, True), (20, False)])
+def test_few_points_above_a_car_are_a_part_of_it(points, is_part):
+    tracks = tracks_at([WHOLE], CAR)
+    after = regrouped(tracks, associated(frame_of([REAR, TALLER], points=[POINTS, points])[1], [0]))
+    assert len(after.proposals) == (1 if is_part else 2)
 
 
 BICYCLE = box(10, 3, 1.8, 0.6, 1.7)

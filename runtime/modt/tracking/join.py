@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modt.class_sizes import HAS_PARTS, IS_PERSON, IS_RIDER, IS_VEHICLE, MAX_CAR_M, PART_PERSON, WHOLE_SIZE_M
+from modt.class_sizes import HAS_PARTS, IS_PERSON, IS_VEHICLE, MAX_CAR_M, PART_PERSON, WHOLE_SIZE_M
 from modt.geometry.kdop import widths
 from modt.tracking.pairs import Situation, first_of_each, fit_together, mask_at
 from modt.types import NONE, Bool, Int
@@ -52,11 +52,15 @@ def _known_parts(now: Situation) -> Joins:
 
     is_car = IS_VEHICLE[tracks.object_class]
     known_m = widths(tracks.known_kdops(rows))
-    # Cyclists and background no longer than a car join no possible person, background joins no part of a car.
+    # Cyclists and background no longer than a car join no possible person, cars none who is clearly seen and taller.
+    # Background joins no part of a car.
     may_be_car = known_m.max(axis=0, initial=0.0) < MAX_CAR_M
     of_car = mask_at(is_car, now.assignment.track_of_proposal[parts])
-    joins = is_car[rows] | (
-        ~_may_be_person(now, parts) & (IS_RIDER[tracks.object_class[rows]] | (may_be_car & ~of_car))
+    top = now.observations.top
+    stands_out = top[parts] > top[hosts] + now.tuning.taller_m
+    stands_out &= now.observations.count[parts] >= now.tuning.min_person_points
+    joins = (is_car[rows] & ~stands_out) | (
+        ~_may_be_person(now, parts) & (HAS_PARTS[tracks.object_class[rows]] | (may_be_car & ~of_car))
     )
     kdop = now.observations.kdop
     together = np.maximum(kdop.take(parts, axis=1), kdop.take(hosts, axis=1))

@@ -362,6 +362,15 @@ class RegroupingTuning:
     fewer ends of pieces measure a position.
     Chosen on: judgement."""
 
+    taller_m: float = 0.08
+    """Height above a car from which a possible person within its known extent is no part of it [m]. Less: cars fall
+    apart. Greater: who stands in an open door becomes a part of the car.
+    Chosen on: people at the doors of simulated cars, with a check on simulated streets."""
+
+    min_person_points: int = 20
+    """Points from which this holds. Less: cars of which little is seen fall apart.
+    Chosen on: the same."""
+
     min_probability: float = 0.5
     """A track gives up its proposal for a piece only if the posterior of its class is at least this. Less: tracks of
     false people become longer.
