@@ -368,8 +368,8 @@ class RegroupingTuning:
     Chosen on: people at the doors of simulated cars, with a check on simulated streets."""
 
     min_person_points: int = 20
-    """Points from which this holds. Less: cars of which little is seen fall apart.
-    Chosen on: the same."""
+    """Points from which such a possible person is no part of the car. Less: cars of which little is seen fall apart.
+    Chosen on: simulated streets."""
 
     min_probability: float = 0.5
     """A track gives up its proposal for a piece only if the posterior of its class is at least this. Less: tracks of
