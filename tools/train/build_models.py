@@ -110,7 +110,8 @@ def train_further(crops: list[Path], work: Path, out: Path, steps: int, *options
     sparse = {kind: work / f"{kind}-{seed}.npz" for kind, (seed, _, _) in SPARSE_WORLDS.items()}
     bare = [work / f"bare-{seed}.npz" for seed in BARE_WORLDS]
     people = [sparse["people"], *(work / f"people-{seed}.npz" for seed in PEOPLE_WORLDS)]
-    riders = [sparse["riders"], *(work / f"riders-{seed}.npz" for seed in RIDER_WORLDS)]
+    first_riders, held_riders = (work / f"riders-{seed}.npz" for seed in RIDER_WORLDS)
+    riders = [first_riders, sparse["riders"], held_riders]
     worn = [work / f"worn-{seed}.npz" for seed in WORN_WORLDS]
     streets = [work / f"street-{seed}.npz" for seed in STREET_WORLDS]
     data: list[str | Path] = ["--bare", *bare, "--people", *people, "--riders", *riders, "--worn", *worn]
