@@ -10,10 +10,10 @@ kinds of crops beside one another: those of --bare are background, those of --pe
 have the labels of the simulator, and those of --crops, the data of the model, keep the posterior that the network
 gives them. A share of these is changed as worn sensors would measure them, and keeps the posterior of the unchanged.
 So the class frequencies that the posteriors assume hold on streets. Crops of that data that are as narrow and low as
-a person are drawn oftener: bins, plants, signs and posts of streets stay background. The box classifier
-is trained alike, without augmentation: the box of a car of which a part is cut off is the box of a heap. One that has
-learnt these sweeps before is kept by --keep-boxes: to learn them again costs cars and people of real scans. The model
-is replaced, and its card gets a section with the false objects, the people and the riders on the held data sets, on
+a person are drawn oftener: bins, plants, signs and posts of streets stay background. The box classifier is trained
+alike, without augmentation: the box of a car of which a part is cut off is the box of a heap. One that has learnt
+these sweeps before is kept by --keep-boxes: to learn them again costs cars and people of real scans. The model is
+replaced, and its card gets a section with the false objects, the people and the riders on the held data sets, on
 which nothing is trained.
 """
 
@@ -461,9 +461,10 @@ def main() -> None:
         _sources("of streets", streets),
         _sources("of the data of the model, which keep their posteriors", data),
     ]
+    kept_boxes = ", the box classifier kept" if args.keep_boxes else ""
     facts = [
         f"- trained from the model of sha256 {first_sha256} on, seed {SEED}, {args.steps} steps, "
-        f"torch {torch.__version__}, {seconds:.0f} s on one core",
+        f"torch {torch.__version__}, {seconds:.0f} s on one core{kept_boxes}",
         f"- crops: {'; '.join(crops)}",
     ]
     told = section(before, after, held, data, facts)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modt.class_sizes import HAS_PARTS, IS_PERSON, IS_VEHICLE, MAX_CAR_M, PART_PERSON, WHOLE_SIZE_M
+from modt.class_sizes import HAS_PARTS, IS_PERSON, IS_RIDER, IS_VEHICLE, MAX_CAR_M, PART_PERSON, WHOLE_SIZE_M
 from modt.geometry.kdop import widths
 from modt.tracking.pairs import Situation, first_of_each, fit_together, mask_at
 from modt.types import NONE, Bool, Int
@@ -52,16 +52,17 @@ def _known_parts(now: Situation) -> Joins:
 
     is_car = IS_VEHICLE[tracks.object_class]
     known_m = widths(tracks.known_kdops(rows))
-    # Cyclists and background no longer than a car join no possible person, cars none who is clearly seen and taller.
-    # Background joins no part of a car.
-    may_be_car = known_m.max(axis=0, initial=0.0) < MAX_CAR_M
-    of_car = mask_at(is_car, now.assignment.track_of_proposal[parts])
+    may_be_person = _may_be_person(now, parts)
+    # A car has parts of every shape, but nobody who is clearly seen above it, as in its open door.
     top = now.observations.top
-    stands_out = top[parts] > top[hosts] + now.tuning.taller_m
+    stands_out = may_be_person & (top[parts] > top[hosts] + now.tuning.taller_m)
     stands_out &= now.observations.count[parts] >= now.tuning.min_person_points
-    joins = (is_car[rows] & ~stands_out) | (
-        ~_may_be_person(now, parts) & (HAS_PARTS[tracks.object_class[rows]] | (may_be_car & ~of_car))
-    )
+    of_car_host = is_car[rows] & ~stands_out
+    # Cyclists and background no longer than a car join no possible person, background joins no part of a car.
+    may_be_car = known_m.max(axis=0, initial=0.0) < MAX_CAR_M
+    has_car_track = mask_at(is_car, now.assignment.track_of_proposal[parts])
+    of_other_host = ~may_be_person & (IS_RIDER[tracks.object_class[rows]] | (may_be_car & ~has_car_track))
+    joins = of_car_host | of_other_host
     kdop = now.observations.kdop
     together = np.maximum(kdop.take(parts, axis=1), kdop.take(hosts, axis=1))
     joins &= (widths(together) < known_m + now.tuning.max_excess_m).all(axis=0)
