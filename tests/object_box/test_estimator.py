@@ -138,12 +138,29 @@ def test_a_parked_car_does_not_jump_by_a_quarter_turn(estimator):
     assert np.abs(wrap(np.diff(headings))).max() < 0.1
 
 
+def middle_of_the_flank(box):
+    """(3, n) points of a flank of which 1.7 m are seen, as long as a car is wide."""
+    flank = visible_points(box, ["side"])
+    along = np.cos(box[6]) * (flank[0] - box[0]) + np.sin(box[6]) * (flank[1] - box[1])
+    return np.ascontiguousarray(flank[:, np.abs(along) < 0.85])
+
+
+@pytest.mark.parametrize(
+    ("ahead_m", "beside_m", "in_line"), [(25.0, 0.0, True), (1.0, -2.0, True), (35.0, 0.0, False), (8.0, 5.0, False)]
+)
+def test_a_car_seen_in_part_stands_as_one_in_line_with_it(estimator, ahead_m, beside_m, in_line):
+    scene = Scene(estimator, [ObjectClass.CAR, ObjectClass.CAR])
+    other = CAR.copy()
+    c, s = np.cos(CAR[6]), np.sin(CAR[6])
+    other[:2] += ahead_m * c - beside_m * s, ahead_m * s + beside_m * c
+    for _ in range(15):
+        boxes = scene.show([middle_of_the_flank(CAR), visible_points(other)], [CAR[6]] * 2)
+    assert (angle(boxes[0, 6], CAR[6]) < 0.1) == in_line
+
+
 def test_a_box_that_was_turned_wrongly_turns_once_the_long_side_is_seen(estimator):
     scene = Scene(estimator, [ObjectClass.CAR])
-    part = visible_points(CAR, ["side"])
-    c, s = np.cos(CAR[6]), np.sin(CAR[6])
-    along = c * (part[0] - CAR[0]) + s * (part[1] - CAR[1])
-    (first,) = scene.show([np.ascontiguousarray(part[:, np.abs(along) < 0.85])], [CAR[6]])
+    (first,) = scene.show([middle_of_the_flank(CAR)], [CAR[6]])
     for _ in range(10):
         (box,) = scene.show([visible_points(CAR)], [CAR[6]])
     assert angle(first[6], CAR[6] + np.pi / 2) < 0.1  # headings are tried at every 5 degrees

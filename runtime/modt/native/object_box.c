@@ -19,7 +19,7 @@ typedef struct {
     uint8_t *heading_known, *estimated SHAPE(m);
     const double (*box)[7] SHAPE(m, 7);
     const double (*x)[4], (*velocity_covariance)[4] SHAPE(m, 4);
-    const double (*velocity)[2] SHAPE(m, 2);
+    const double (*velocity)[2], (*neighbour)[2] SHAPE(m, 2); /* headings of neighbours (WholeBoxes._neighbours) */
     const double *moved_m SHAPE(m);
     const i64 *proposal, *motion, *object_class SHAPE(m);
     i64 m;
@@ -59,7 +59,7 @@ typedef struct {
     double side_noise_m, initial_sigma_rad, drift_sigma_rad, fit_sigma_rad, min_side_m, full_side_m, least_fit_weight;
     double person_fit_weight, pedestrian_fit_weight, motion_sigma_rad, min_speed_mps, min_moved_m, evidence_memory;
     double max_evidence, moving_evidence, turning_evidence, whole_side_evidence, axis_spread_m, max_frame_evidence;
-    double shoulder_ratio, across_evidence;
+    double shoulder_ratio, across_evidence, neighbour_evidence;
 } HeadingTuning;
 
 /* object_box.tuning.SizeTuning */
@@ -112,6 +112,13 @@ static double axis_evidence(double length_m, double width_m, i64 class, const Cl
                    - likelihood(width_m, 0, usual_m, spread_m, tuning)
                    - likelihood(length_m, 1, usual_m, spread_m, tuning);
     return clip(ratio, -tuning->max_frame_evidence, tuning->max_frame_evidence);
+}
+
+/* estimator.WholeBoxes._evidence_of_neighbours */
+static double evidence_of_neighbour(Vector neighbour, Vector side, const HeadingTuning *tuning)
+{
+    double along = dot(neighbour, side);
+    return tuning->neighbour_evidence * (2 * along * along - dot(neighbour, neighbour));
 }
 
 /* estimator.WholeBoxes._fit_variance */
@@ -194,7 +201,9 @@ static void turn_row(const ObjectBoxColumns *tracks, i64 row, Vector side, const
                      const ClassSizes *sizes, const HeadingTuning *tuning)
 {
     const i64 class = tracks->object_class[row];
+    const Vector neighbour = {tracks->neighbour[row][0], tracks->neighbour[row][1]};
     double *heading = tracks->heading[row], evidence = axis_evidence(sides_m[0], sides_m[1], class, sizes, tuning);
+    evidence += evidence_of_neighbour(neighbour, side, tuning);
     if (!tracks->estimated[row]) {
         Vector first = evidence >= 0 ? side : left_of(side);
         heading[0] = first.x;

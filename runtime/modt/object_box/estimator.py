@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modt.class_sizes import IS_PERSON, IS_WALKER, MAX_SIZE_M, USUAL_SIZE_M, USUAL_SPREAD_M
+from modt.class_sizes import IS_PERSON, IS_VEHICLE, IS_WALKER, MAX_SIZE_M, USUAL_SIZE_M, USUAL_SPREAD_M
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.object_box.tuning import ObjectBoxTuning
 from modt.placement import Placement
@@ -53,6 +53,7 @@ class Seen:
         box: (R, 7) boxes of the frame [world].
         long_side: (R, 2) unit vectors along the longer sides of the fitted rectangles [world].
         sides_m: (2, R) longer and shorter sides of these rectangles [m].
+        neighbour: (R, 2) headings by which the axes of cars are guessed (`WholeBoxes._neighbours`) [world].
         moving: (R,) objects that move.
         forward: (2,) unit vector of the sensor's x axis in the ground plane [world].
     """
@@ -63,6 +64,7 @@ class Seen:
     box: Float64
     long_side: Float64
     sides_m: Float64
+    neighbour: Float64
     moving: Bool
     forward: tuple[float, float]
 
@@ -94,7 +96,8 @@ class WholeBoxes(SeenBoxes):
             placement: pose of the sensor.
         """
         rows = ((decisions.object_class > 0) & motion.observed).nonzero()[0]
-        self._estimate(own, motion, decisions.object_class, proposals, placement.T_world_sensor, rows)
+        neighbour = self._neighbours(own, motion, decisions.object_class)
+        self._estimate(own, motion, decisions.object_class, neighbour, proposals, placement.T_world_sensor, rows)
         heading = own.heading.take(rows, axis=0)
         own.whole_box[rows, 6] = np.arctan2(heading[:, 1], heading[:, 0])
 
@@ -103,11 +106,15 @@ class WholeBoxes(SeenBoxes):
         own: ObjectBoxes,
         motion: Motion,
         object_class: Int,
+        neighbour: Float64,
         proposals: Proposals,
         T_world_sensor: Float64,
         rows: Int,
     ) -> None:
-        """Write the columns of all tracks, but the yaw of the objects in view, whose rows (R,) are given."""
+        """Write the columns of all tracks, but the yaw of the objects in view, whose rows (R,) are given.
+
+        The other arrays are of all tracks: their classes (M,) and the headings of their neighbours (M, 2).
+        """
         others = (object_class == 0).nonzero()[0]
         own.whole_box[others] = motion.box.take(others, axis=0)
         lost = ((object_class > 0) & ~motion.observed & own.estimated).nonzero()[0]
@@ -125,6 +132,7 @@ class WholeBoxes(SeenBoxes):
             motion.box.take(rows, axis=0),
             long_side,
             sides_m,
+            neighbour[rows],
             self._moving(motion, rows),
             forward,
         )
@@ -138,6 +146,29 @@ class WholeBoxes(SeenBoxes):
         state.whole_box[:, :6] = np.column_stack([centre, bottom + size_m[:, 2] / 2, size_m])
         for name, column in state.columns().items():
             getattr(own, name)[rows] = column
+
+    def _neighbours(self, own: ObjectBoxes, motion: Motion, object_class: Int) -> Float64:
+        """(M, 2) heading of the nearest car in line whose length was seen, for cars whose length was not, else 0.
+
+        Cars stand in rows and drive in lanes. So a car near the axis of another one mostly has the same axis.
+        """
+        tuning = self.tuning.heading
+        heading = np.zeros((len(own), 2))
+        is_car = IS_VEHICLE[object_class]
+        is_long = own.estimated & (own.known_m[:, 0] > MAX_SIZE_M[object_class, 1])
+        unknown = (is_car & ~is_long).nonzero()[0]
+        known = (is_car & is_long).nonzero()[0]
+        if not len(known):
+            return heading
+        step = motion.x[unknown, None, :2] - motion.x[known, :2]  # (unknown, known, 2)
+        ahead = own.heading[known]
+        along_m = np.abs(step[:, :, 0] * ahead[:, 0] + step[:, :, 1] * ahead[:, 1])
+        across_m = np.abs(step[:, :, 1] * ahead[:, 0] - step[:, :, 0] * ahead[:, 1])
+        distance_m = np.where(across_m < tuning.beside_m, along_m + across_m, np.inf)
+        in_line = distance_m.min(axis=1) < tuning.neighbour_m
+        nearest = distance_m[in_line].argmin(axis=1)
+        heading[unknown[in_line]] = ahead[nearest]
+        return heading
 
     def _moving(self, motion: Motion, rows: Int) -> Bool:
         """(R,) rows that move, or may move and went far enough."""
@@ -197,7 +228,7 @@ class WholeBoxes(SeenBoxes):
         tuning = self.tuning.heading
         # The fit comes before the motion, which overrules it. What stands then turns by 90 degrees where its evidence
         # speaks against the axis; length and width change places with it.
-        evidence = self._axis_evidence(seen)
+        evidence = self._axis_evidence(seen) + self._evidence_of_neighbours(seen)
         new = ~state.estimated
         first = np.where(evidence[:, None] >= 0, seen.long_side, _left_of(seen.long_side))
         state.heading[new] = first[new]
@@ -234,6 +265,11 @@ class WholeBoxes(SeenBoxes):
         shoulders = -tuning.across_evidence * (length_m > tuning.shoulder_ratio * width_m)
         most = tuning.max_frame_evidence
         return np.where(IS_WALKER[seen.object_class], shoulders, np.clip(ratio, -most, most))
+
+    def _evidence_of_neighbours(self, seen: Seen) -> Float64:
+        """(R,) the same by the neighbours: the most where one stands along the longer visible side, or across it."""
+        along = _dot(seen.neighbour, seen.long_side)
+        return self.tuning.heading.neighbour_evidence * (2 * along * along - _dot(seen.neighbour, seen.neighbour))
 
     def _turn_to_fit(self, state: ObjectBoxes, seen: Seen, evidence: Float64) -> None:
         """Turn the headings to the nearest of the four directions of each rectangle, and count its evidence."""

@@ -49,17 +49,18 @@ class NativeWholeBoxes(WholeBoxes):
         own: ObjectBoxes,
         motion: Motion,
         object_class: Int,
+        neighbour: Float64,
         proposals: Proposals,
         T_world_sensor: Float64,
         rows: Int,
     ) -> None:
-        """Write the columns of all tracks, but the yaw of the objects in view, whose rows (R,) are given."""
+        """The same."""
         columns = {name: getattr(motion, name) for name in _OF_THE_TRACKER}
         columns["velocity_covariance"] = motion.velocity_covariance.reshape(-1, 4)
         ground_z_m = proposals.ground_z_m
         forward_x, forward_y = forward_of(T_world_sensor)
         self._library.modt_object_boxes(
-            _COLUMNS.of(own, **columns, object_class=object_class, m=len(own)),
+            _COLUMNS.of(own, **columns, object_class=object_class, neighbour=neighbour, m=len(own)),
             _PROPOSALS.of(
                 proposals,
                 ground_z_m=np.full(len(proposals), np.inf) if ground_z_m is None else ground_z_m,
