@@ -112,12 +112,14 @@ def measured(
     mean = tracks.mean_kdop.T.take(rows, axis=1) + DIRECTIONS.T @ x.T
     kdop = observations.kdop.take(proposals, axis=1)
     moves = tracks.moving_probability[rows] > 0.5
-    # What rests has its near end hidden by its neighbours as often as it hides its far end itself.
+    # The near end of a moving car measures, since the car hides its far end itself. The near end of a car at rest is
+    # hidden by its neighbours as often.
     is_car = tracks.object_class[rows] == ObjectClass.CAR.value
     sight = observations.sight(proposals) * (is_car & moves)
-    # The place of what rests stays in doubt. What moves is measured from where it was measured last.
+    # Doubt about the ends lasts for a track at rest. For a moving one only the doubt of this frame counts.
     before = tracks.end_variance.T.take(rows, axis=1) * ~moves
-    # What is seen of a car between two things that hide the rest may lie anywhere within what is known of it.
+    # Where less than half of a car's known width is seen, either end may be the edge of what hides the rest, and the
+    # car may lie anywhere beyond. This doubt is of this frame; like all doubt it is bounded by the width seen.
     known_m = widths(tracks.envelope.T.take(rows, axis=1))
     seen_m = widths(kdop)
     is_part = is_car & (seen_m.max(axis=0) < known_m.max(axis=0) / 2)
