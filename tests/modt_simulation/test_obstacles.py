@@ -1,5 +1,7 @@
 """Scenes in which obstacles are easily lost hold the people, movers and ceilings that they are made for."""
 
+from collections import defaultdict
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from modt.classes import ObjectClass
 from modt.geometry import transform
 from modt_simulation.movers import MAKERS
 from modt_simulation.obstacles import GAPS_M
+from modt_simulation.postures import NEAR_M, RINGS_M, people
 from modt_simulation.synthetic_stream import SyntheticStream
 
 
@@ -27,14 +30,34 @@ def test_people_of_the_wall_are_as_close_as_they_are_said_to_be(seed):
         assert at_wall[f"stands {gap:g} m from a wall"] == pytest.approx(gap + 0.2)
         assert at_wall[f"walks {gap:g} m from a wall"] == pytest.approx(gap + 0.3)
     roles = [body.role for body in world.bodies]
-    assert {
-        role: roles.count(role) for role in ("in a doorway", "at a car's door", "between cars", "in a queue")
-    } == {
-        "in a doorway": 1,
-        "at a car's door": 1,
-        "between cars": 3,
-        "in a queue": 4,
-    }
+    assert (roles.count("between cars"), roles.count("in a queue")) == (3, 4)
+    assert sum(role.endswith("door") for role in roles) == 1
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_doorway_is_as_wide_as_it_is_said_to_be_and_ends_before_the_cars(seed):
+    world = world_of("wall", seed)
+    boxes = world.boxes(0.0)
+    (role,) = (body.role for body in world.bodies if "doorway" in body.role)
+    jambs = boxes[[not body.kind.name and body.size[1] == 1.0 for body in world.bodies]]
+    np.testing.assert_allclose(2 * np.abs(jambs[:, 1]) - 1.0, float(role.split()[-2]))
+    at_door = boxes[[body.role.endswith("door") for body in world.bodies]]
+    assert np.abs(at_door[:, 1]) - 0.3 > np.abs(jambs[:, 1]).max() + 0.5
+
+
+def test_who_stands_at_an_open_door_is_between_it_and_the_car():
+    opened = 0
+    for seed in range(12):
+        world = world_of("wall", seed)
+        for body in world.bodies:
+            if body.role == "at a car's open door":
+                opened += 1
+                car = max((b for b in world.bodies if b.kind.name == "Car"), key=lambda b: b.path.at(0.0)[0])
+                leaf = car.solids.centre[-2]
+                ahead, left, _ = np.subtract(body.path.at(0.0), car.path.at(0.0))
+                assert 0.2 < leaf[0] - ahead < 0.8
+                assert car.size[1] / 2 < left < leaf[1] + 0.1
+    assert 2 < opened < 10
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -57,17 +80,24 @@ def test_movers_pass_at_half_time_and_have_no_class():
     assert seen == {maker.__name__ for maker in MAKERS}
 
 
-def test_who_lies_is_low_and_who_crouches_lower_than_who_stands():
-    stream = SyntheticStream("lying", "os1-128", 0.1, 1, height_m=1.2)
-    frame, truth = stream.simulator.sweep(0)
-    z = transform(frame.T_world_sensor, frame.points[:, :3].astype(np.float64))[:, 2]
-    bodies = stream.simulator.world.bodies
-    tops = {}
-    for body, n in zip(truth.bodies.tolist(), truth.points.tolist(), strict=True):
-        if n > 100:
-            tops.setdefault(bodies[body].role, []).append(z[truth.instance == body].max())
+@pytest.mark.slow
+def test_people_in_postures_are_on_the_rings_and_as_tall_as_they_are_said_to_be():
+    tops = defaultdict(list)
+    for seed in range(14):
+        stream = SyntheticStream("postures", "os1-32", 0.1, seed)
+        frame, truth = stream.simulator.sweep(0)
+        z = transform(frame.T_world_sensor, frame.points[:, :3].astype(np.float64))[:, 2]
+        world = stream.simulator.world
+        for body, n in zip(truth.bodies.tolist(), truth.points.tolist(), strict=True):
+            role = world.bodies[body].role
+            distance_m = np.hypot(*world.bodies[body].path.at(0.0)[:2])
+            rings_m = (NEAR_M,) if role == "at arm's length" else RINGS_M
+            assert np.abs(np.subtract(rings_m, distance_m)).min() < 1e-9
+            if n > 40:
+                tops[role].append(z[truth.instance == body].max())
+    assert set(tops) == {*people(np.random.default_rng(0)), "at arm's length"}
     assert np.max(tops["lies"]) < 0.5
-    assert 0.7 < np.median(tops["crouches"]) < np.median(tops["kneels"]) < 1.5
+    assert 0.7 < np.median(tops["crouches"]) < np.median(tops["kneels"]) < 1.5 < np.median(tops["stands"])
 
 
 def test_stairs_rise_ahead_and_fall_to_the_right():

@@ -164,11 +164,6 @@ class SceneBuilder:
         seat = box((-0.02, 0.0, 0.22), (0.42, 0.42, 0.44), Material.WOOD)
         self._person(kinds.SITTER, (0.8, 0.6, 1.32), path, height, seat)
 
-    def person_in(self, posture: Posture, path: Path, role: str) -> None:
-        """Add a person in a posture near the ground."""
-        height = clipped_normal(self.rng, 1.74, 0.08, 1.5, 1.95)
-        self._person(kinds.PEDESTRIAN, LOW_M[posture], path, height, Solids.none(), posture=posture, role=role)
-
     def posed(
         self,
         posture: Posture,

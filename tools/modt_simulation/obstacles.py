@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.random import Generator
 
 from modt.types import Float64
-from modt_simulation import kinds, scenery
+from modt_simulation import belongings, kinds, scenery
 from modt_simulation.builder import MARGIN_M, SceneBuilder
 from modt_simulation.materials import Material
 from modt_simulation.motion import Path
 from modt_simulation.movers import MAKERS, Mover, forklift
-from modt_simulation.people import Posture
 from modt_simulation.solids import Solids, block, ellipsoid
 from modt_simulation.terrain import Terrain
-from modt_simulation.vehicles import car_size
+from modt_simulation.vehicles import car_size, open_door
 from modt_simulation.world import Body, World
 from modt_simulation.yard import ROBOT_M, enclose, floor, walkers
 
@@ -26,6 +26,8 @@ TOUCHING_M = -0.1
 """Margin around bodies of which some touch."""
 GAPS_M = (0.05, 0.2, 0.5)
 """Gaps between people and a wall."""
+DOORWAYS_M = (0.9, 1.0, 1.2)
+"""Widths of doorways."""
 SHOULDER_M = 0.3
 """Half the breadth of a person."""
 BACK_M = 0.2
@@ -63,14 +65,16 @@ def wall(rng: Generator, seconds: float, height_m: float) -> World:
 
 
 def _doorway(builder: SceneBuilder, x: float) -> None:
-    """A wall across the way, ending 2.2 m to both sides, and a person in its opening of a metre."""
+    """A wall across the way, a metre to both sides of its opening, and a person in it."""
+    width = builder.rng.choice(DOORWAYS_M)
     for side in (-1, 1):
-        builder.scenery(block((0.2, 1.7, 2.5), Material.WALL), x, 1.35 * side)
-    builder.pedestrian(Path.standing(x, builder.rng.uniform(-0.15, 0.15), np.pi), role="in a doorway")
+        builder.scenery(block((0.2, 1.0, 2.5), Material.WALL), x, side * (1.0 + width) / 2)
+    place = Path.standing(x, builder.rng.uniform(-0.1, 0.1), np.pi)
+    builder.pedestrian(place, role=f"in a doorway of {width:g} m")
 
 
 def _row_of_cars(builder: SceneBuilder, y: float) -> None:
-    """Four cars, one behind the other, with a person in each gap and one at the last one's door."""
+    """Four cars, one behind the other, with a person in each gap and one at the last one's door, open or not."""
     rng = builder.rng
     x = rng.uniform(-11.0, -8.0)
     for gap in (0.7, 1.0, 1.6, 0.0):
@@ -80,8 +84,13 @@ def _row_of_cars(builder: SceneBuilder, y: float) -> None:
         x += size[0] + gap
         if gap:
             builder.pedestrian(Path.standing(x - gap / 2, y + rng.uniform(-0.2, 0.2), np.pi / 2), role="between cars")
-    door = Path.standing(middle + rng.uniform(-0.8, 0.8), y + size[1] / 2 + rng.uniform(0.18, 0.35), -np.pi / 2)
-    builder.pedestrian(door, role="at a car's door")
+    role = "at a car's door"
+    if rng.random() < 0.5:
+        role = "at a car's open door"
+        car = builder.bodies[-1]
+        builder.bodies[-1] = replace(car, solids=Solids.join([car.solids, open_door(rng, size)]))
+    place = Path.standing(middle + rng.uniform(0.0, 0.3), y + size[1] / 2 + rng.uniform(0.18, 0.35), -np.pi / 2)
+    builder.pedestrian(place, role=role)
 
 
 def grass(rng: Generator, seconds: float, height_m: float) -> World:
@@ -209,24 +218,24 @@ def _passing(builder: SceneBuilder, mover: Mover, name: str, distance_m: float, 
         builder.walker(line, speed_mps, start - mover.pusher_m, f"pushes a {name}")
 
 
-def lying(rng: Generator, seconds: float, height_m: float) -> World:
-    """People who lie, crouch, kneel and sit, all around in a walled yard."""
+def vines(rng: Generator, seconds: float, height_m: float) -> World:
+    """Rows of vines at stakes, along and beside the way of the robot, and people between them."""
     builder = SceneBuilder(rng, seconds)
-    roles = {
-        Posture.LIE: "lies",
-        Posture.FLOOR: "sits on the floor",
-        Posture.CROUCH: "crouches",
-        Posture.KNEEL: "kneels",
-    }
-    for k in range(24):
-        place = Path.standing(*_around(rng, 1.2, 12.0))
-        postures = tuple(roles)
-        posture = postures[max(k % 6 - 2, 0)]
-        builder.person_in(posture, place, roles[posture])
-    for _ in range(3):
-        builder.sitter(Path.standing(*_around(rng, 1.2, 12.0)))
-    enclose(builder, (18.0, 18.0), 3.0)
-    return _level(builder, Material.PAVING, height_m)
+    walkers(builder, (9.0, 9.0), 2)
+    for y in np.arange(-4.5, 5.0, 3.0):
+        for x in np.arange(-15.0, 15.0, 1.2):
+            builder.scenery(belongings.stake(rng), x, y + rng.normal(0.0, 0.1))
+    return _level(builder, Material.GRASS, height_m)
+
+
+def scooters(rng: Generator, seconds: float, height_m: float) -> World:
+    """Rows of parked motor scooters on both sides, and people between them."""
+    builder = SceneBuilder(rng, seconds)
+    walkers(builder, (9.0, 9.0), 2)
+    for y in (-4.0, 4.0):
+        for x in np.arange(-15.0, 15.0, rng.uniform(0.7, 0.95)):
+            builder.parked_scooter(x, y + rng.normal(0.0, 0.15), rng.normal(np.pi / 2, 0.12))
+    return _level(builder, Material.ASPHALT, height_m, TOUCHING_M)
 
 
 def clutter(rng: Generator, seconds: float, height_m: float) -> World:

@@ -16,7 +16,20 @@ from modt.types import DESKEWED, Frame, Self
 from modt_simulation.faults import read_faults
 from modt_simulation.gait import Gait
 from modt_simulation.indoors import carpark, corridor, hall, lift, lobby, warehouse
-from modt_simulation.obstacles import clutter, grass, heaps, hedges, hills, loading, lying, movers, stairs, wall
+from modt_simulation.obstacles import (
+    clutter,
+    grass,
+    heaps,
+    hedges,
+    hills,
+    loading,
+    movers,
+    scooters,
+    stairs,
+    vines,
+    wall,
+)
+from modt_simulation.postures import postures
 from modt_simulation.sensors import sensor as sensor_model
 from modt_simulation.simulator import Simulator, Truth
 from modt_simulation.street import crossing, street
@@ -32,7 +45,7 @@ SCENES = {
     scene.__name__: scene
     for scene in (
         *(street, crossing, yard, crowd, ramp, dock, hall, corridor, lobby, lift, warehouse, carpark),
-        *(wall, grass, hedges, hills, heaps, stairs, movers, loading, lying, clutter),
+        *(wall, grass, hedges, vines, scooters, hills, heaps, stairs, movers, loading, postures, clutter),
     )
 }
 """Scene by name: the world by a random generator, a duration [s] and the height of the sensor [m]."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
+from modt.geometry import rotation_zyx
 from modt_simulation.materials import Material
 from modt_simulation.solids import Solids, Triple, box, cylinder, rod, rounded, wedge
 
@@ -43,6 +44,14 @@ def car(rng: Generator, size: Triple) -> Solids:
     return Solids.join(
         [hull, *glasshouse, seats, pillars, wheels, mirrors, *_reflectors(hull, 0.43, belt - 0.16, belt - 0.12)]
     )
+
+
+def open_door(rng: Generator, size: Triple) -> Solids:
+    """The open front door on the left of a car of (length, width, height)."""
+    leaf = box((0.48, 0.0, 0.68), (0.95, 0.06, 0.7), Material.CAR_PAINT)
+    window = box((0.5, 0.0, 1.2), (0.8, 0.03, 0.34), Material.GLASS)
+    turn = rotation_zyx(0.0, 0.0, np.pi - rng.uniform(1.05, 1.3))
+    return Solids.join([leaf, window]).transformed(turn, np.array([0.75, size[1] / 2, 0.0]))
 
 
 @dataclass
