@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 import modt
 from modt.app import assembly
@@ -44,15 +45,15 @@ def test_step_returns_what_the_pipeline_finds(frames, mode):
     for frame in frames:
         found = library.step(frame.points, frame.stamp_s, frame.T_world_sensor)
         result = pipeline.step(frame, chosen.budget(config))
-        np.testing.assert_array_equal(found.id, result.tracks.id)
-        np.testing.assert_array_equal(found.posterior, result.tracks.posterior)
-        np.testing.assert_array_equal(found.visible, result.tracks.proposal != NONE)
+        assert_array_equal(found.id, result.tracks.id)
+        assert_array_equal(found.posterior, result.tracks.posterior)
+        assert_array_equal(found.visible, result.tracks.proposal != NONE)
         boxes = result.proposals.box[result.tracks.proposal[found.visible]]
-        np.testing.assert_array_equal(found.seen[found.visible], boxes)
+        assert_array_equal(found.seen[found.visible], boxes)
         assert np.isnan(found.seen[~found.visible]).all()
-        np.testing.assert_array_equal(found.T_world_sensor, frame.T_world_sensor)
-        np.testing.assert_array_equal(found.labels, result.labels)
-        np.testing.assert_array_equal(found.obstacles(), result.obstacles())
+        assert_array_equal(found.T_world_sensor, frame.T_world_sensor)
+        assert_array_equal(found.labels, result.labels)
+        assert_array_equal(found.obstacles(), result.obstacles())
     assert len(found.objects()) > 0
     assert ((found.objects().object_class > 0) | found.objects().moving).all()
 
@@ -72,7 +73,7 @@ def test_labels_have_the_order_of_the_given_points_though_the_sensor_hangs_tilte
         assert (kinds == np.minimum(expected.labels, PointKind.MEMBER)).mean() > 0.99
         rows = found.obstacles()
         assert len(rows) > 500
-        np.testing.assert_array_equal(rows, np.flatnonzero(np.isin(found.labels, OBSTACLES) | (found.labels >= 0)))
+        assert_array_equal(rows, np.flatnonzero(np.isin(found.labels, OBSTACLES) | (found.labels >= 0)))
 
 
 def test_frames_of_a_recording_are_stepped_with_their_poses_and_times(tmp_path):
@@ -83,7 +84,7 @@ def test_frames_of_a_recording_are_stepped_with_their_poses_and_times(tmp_path):
         found = by_frame.step(frame)
         expected = by_hand.step(frame.points, frame.stamp_s, frame.T_world_sensor, turn_s=frame.turn_s)
         assert found.as_dicts() == expected.as_dicts()
-        np.testing.assert_array_equal(found.T_world_sensor, frame.T_world_sensor)
+        assert_array_equal(found.T_world_sensor, frame.T_world_sensor)
     assert frame.index == drive.info.end - 1
     with pytest.raises(MisuseError, match="no time"):
         by_hand.step(frame.points)
@@ -96,7 +97,7 @@ def test_without_poses_the_pose_is_the_registered_one(frames):
     start = inverse(frames[0].T_world_sensor)
     for frame in frames:
         found = library.step(frame.points, frame.stamp_s)
-        np.testing.assert_allclose(found.T_world_sensor, start @ frame.T_world_sensor, rtol=0, atol=0.2)
+        assert_allclose(found.T_world_sensor, start @ frame.T_world_sensor, rtol=0, atol=0.2)
     assert np.linalg.norm(found.T_world_sensor[:3, 3]) > 1.0
 
 
@@ -107,11 +108,9 @@ def test_poses_of_utm_give_the_tracks_of_poses_near_their_origin(frames):
     for frame in frames:
         expected = near.step(frame.points, frame.stamp_s, frame.T_world_sensor)
         found = far.step(frame.points, frame.stamp_s, utm @ frame.T_world_sensor)
-        np.testing.assert_array_equal(found.id, expected.id)
-        np.testing.assert_allclose(found.position, expected.position - begin[:2], rtol=0, atol=1e-3)
-        np.testing.assert_allclose(
-            found.T_world_sensor[:3, 3], frame.T_world_sensor[:3, 3] - begin, rtol=0, atol=1e-6
-        )
+        assert_array_equal(found.id, expected.id)
+        assert_allclose(found.position, expected.position - begin[:2], rtol=0, atol=1e-3)
+        assert_allclose(found.T_world_sensor[:3, 3], frame.T_world_sensor[:3, 3] - begin, rtol=0, atol=1e-6)
 
 
 def test_rows_are_had_as_arrays_as_dictionaries_and_by_index(found):
@@ -121,7 +120,7 @@ def test_rows_are_had_as_arrays_as_dictionaries_and_by_index(found):
     assert {row["object_class"] for row in rows} <= set(modt.CLASS_NAMES)
     assert rows[0]["seen"] == found.seen[0].tolist()
     assert found.take(np.array([1])).as_dicts() == rows[1:2]
-    np.testing.assert_array_equal(found.take(np.array([1])).T_world_sensor, np.eye(4))
+    assert_array_equal(found.take(np.array([1])).T_world_sensor, np.eye(4))
     assert [str(row) for row in found] == list(map(str, rows))  # by text: NaN is not itself
     assert (str(found[0]), str(found[np.int64(-1)])) == (str(rows[0]), str(rows[-1]))
     for beyond in (len(rows), -len(rows) - 1):
@@ -155,7 +154,7 @@ def test_points_without_reflectance_and_without_returns_are_taken(frames):
     points = np.vstack([frames[0].points[:, :3], [[np.nan, 0.0, 0.0]]])
     with_nan = library.step(points.tolist(), 0.0)
     without = modt.Pipeline.from_profile("vlp-16").step(frames[0].points[:, :3], 0.0)
-    np.testing.assert_array_equal(with_nan.box_world, without.box_world)
+    assert_array_equal(with_nan.box_world, without.box_world)
     assert len(library.step(np.zeros((0, 4)), 0.1).objects()) == 0
 
 
@@ -165,7 +164,7 @@ def test_points_stored_column_by_column_give_the_same_tracks(frames, columns):
     expected = modt.Pipeline.from_profile("vlp-16").step(points, 0.0)
     found = modt.Pipeline.from_profile("vlp-16").step(np.asfortranarray(points), 0.0)
     assert len(found) > 0
-    np.testing.assert_array_equal(found.box_world, expected.box_world)
+    assert_array_equal(found.box_world, expected.box_world)
 
 
 @pytest.fixture(scope="module", name="library")

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from modt.app import assembly
 from modt.geometry import FieldOfView, inverse, quaternion_of, rotation_zyx, se3, transform
@@ -27,10 +28,10 @@ def test_points_stay_where_they_are_in_the_world_and_in_the_image():
     pose = se3(rotation_zyx(0.1, 0.2, 0.3), np.array([1.0, 2.0, 3.0]))
     frame = Frame(0, 0.0, POINTS, pose, turn_s=0.1)
     level = TILTED.level(frame)
-    np.testing.assert_allclose(level.points[:, :3], POINTS[:, :3] @ R.T, atol=1e-5)
-    np.testing.assert_array_equal(level.points[:, 3], POINTS[:, 3])
+    assert_allclose(level.points[:, :3], POINTS[:, :3] @ R.T, atol=1e-5)
+    assert_array_equal(level.points[:, 3], POINTS[:, 3])
     seen, turned = (transform(f.T_world_sensor, f.points[:, :3].astype(np.float64)) for f in (frame, level))
-    np.testing.assert_allclose(seen, turned, atol=1e-4)
+    assert_allclose(seen, turned, atol=1e-4)
     assert level.turn_s == 0.1
     camera = TILTED.camera(CAMERA)
     rows = np.ones((50, 4))
@@ -38,7 +39,7 @@ def test_points_stay_where_they_are_in_the_world_and_in_the_image():
     for points, of in ((frame.points, CAMERA), (level.points, camera)):
         rows[:, :3] = points[:, :3]
         images.append(rows @ of.P_image_sensor.T)
-    np.testing.assert_allclose(*images, rtol=1e-4, atol=1e-2)
+    assert_allclose(*images, rtol=1e-4, atol=1e-2)
 
 
 def test_the_head_of_a_sensor_upside_down_turns_the_other_way():
@@ -49,7 +50,7 @@ def test_poses_of_ros_2_are_in_the_frame_of_the_tilted_sensor():
     poses = box_poses(np.array([[5.0, 1.0, -0.5, 1.0, 1.0, 1.0, 0.3]]))
     assert in_sensor_frame(poses, None) is poses
     turned = in_sensor_frame(poses, R)
-    np.testing.assert_allclose(turned[0, :3], R.T @ poses[0, :3])
+    assert_allclose(turned[0, :3], R.T @ poses[0, :3])
     expected = quaternion_of(se3(R.T @ rotation_zyx(0.0, 0.0, 0.3), np.zeros(3)))
     assert abs(turned[0, 3:] @ expected) == pytest.approx(1.0)
 
@@ -70,8 +71,8 @@ def test_a_tilted_sensor_gives_the_tracks_of_a_level_one():
     level, tilted = results
     assert len(level.proposals) == len(tilted.proposals)
     assert level.tracks.id.tolist() == tilted.tracks.id.tolist()
-    np.testing.assert_allclose(level.T_world_sensor, tilted.T_world_sensor, atol=1e-9)
+    assert_allclose(level.T_world_sensor, tilted.T_world_sensor, atol=1e-9)
     seen = level.tracks.proposal != NONE
-    np.testing.assert_allclose(level.tracks.box[seen], tilted.tracks.box[seen], atol=0.02)
-    np.testing.assert_allclose(tilted.T_world_sensor @ inverse(level.T_world_sensor), np.eye(4), atol=1e-9)
+    assert_allclose(level.tracks.box[seen], tilted.tracks.box[seen], atol=0.02)
+    assert_allclose(tilted.T_world_sensor @ inverse(level.T_world_sensor), np.eye(4), atol=1e-9)
     assert load("vlp-16").sensor.roll_deg is None

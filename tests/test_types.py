@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.testing import assert_array_equal
 
 from modt.types import NONE, Tracks
 from modt_evaluation.experiments.segmented import chosen
@@ -29,8 +30,8 @@ def test_some_of_the_proposals(counts, data):
     for i, k in enumerate(which):
         own, those = (slice(*p.offsets[n : n + 2]) for p, n in ((some, i), (found, k)))
         assert some.members[own].tolist() == found.members[those].tolist()
-        np.testing.assert_array_equal(some.coordinates[:, own], found.coordinates[:, those])
-    np.testing.assert_array_equal(some.box, found.box[which])
+        assert_array_equal(some.coordinates[:, own], found.coordinates[:, those])
+    assert_array_equal(some.box, found.box[which])
 
 
 @given(st.lists(st.booleans(), max_size=6), st.integers(0, 5))
@@ -41,6 +42,6 @@ def test_tracks_are_renewed_in_every_column(kept, n):
     rows = np.flatnonzero(kept)
     renewed = tracks.renewed(rows, n)
     for name, blank in Tracks.blank(n).columns().items():
-        np.testing.assert_array_equal(getattr(renewed, name), np.concatenate([getattr(tracks, name)[rows], blank]))
+        assert_array_equal(getattr(renewed, name), np.concatenate([getattr(tracks, name)[rows], blank]))
     assert (renewed.id[len(rows) :] == NONE).all()
     assert renewed.columns().keys() == {f.name for f in dataclasses.fields(Tracks)}

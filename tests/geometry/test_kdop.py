@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose
 
 from modt.geometry import rotation_zyx, se3
 from modt.geometry.kdop import (
@@ -71,7 +72,7 @@ def test_coverage_is_the_lesser_of_both_squares(n, seed):
     for one, i, j in zip(found, rows, columns, strict=True):
         common = np.minimum(high[i], high_position[j] + jitter_m) - np.maximum(low[i], low_position[j] - jitter_m)
         part = np.maximum(common, 0.0) / np.maximum(high[i] - low[i], jitter_m)
-        np.testing.assert_allclose(one, min(part[0] * part[2], part[1] * part[3]))
+        assert_allclose(one, min(part[0] * part[2], part[1] * part[3]))
 
 
 def test_kdops_are_the_greatest_coordinates_of_the_points():
@@ -81,7 +82,7 @@ def test_kdops_are_the_greatest_coordinates_of_the_points():
     world = frame.points[:, :3] @ T[:3, :3].T + T[:3, 3]
     for i in range(2):
         along = world[proposals.members[proposals.offsets[i] : proposals.offsets[i + 1]], :2] @ DIRECTIONS
-        np.testing.assert_allclose(found[:, i], along.max(axis=0), atol=1e-4)
+        assert_allclose(found[:, i], along.max(axis=0), atol=1e-4)
     assert observe(Proposals.empty(), T).kdop.shape == (8, 0)
 
 
@@ -166,7 +167,7 @@ def test_what_hides_its_own_far_end_moves_as_its_near_end(far_m):
     after = kdop_of_rectangle(19.2, far_m, 0.9)
     sight = np.array([[1.0], [0.0]])
     shift, covariance, _ = NUMPY_GEOMETRY.measured(before, after, sight, 0.05**2, np.zeros((4, 1)))
-    np.testing.assert_allclose(shift[0], (-0.8, 0.0), atol=0.05)
+    assert_allclose(shift[0], (-0.8, 0.0), atol=0.05)
     assert covariance[0, 0, 0] < 0.2**2
 
 
@@ -195,7 +196,7 @@ def test_measured_displacement_matches_the_slow_reference(n, seed):
     for k in range(n):
         slow = slow_measured(a[:, k], b[:, k], sight[:, k], variance, before[:, k])
         for fast, one in zip((shift[k], covariance[k], end_variance[:, k]), slow, strict=True):
-            np.testing.assert_allclose(fast, one, atol=1e-9)
+            assert_allclose(fast, one, atol=1e-9)
 
 
 @given(st.integers(0, 6), st.integers(0, 2**16))
@@ -204,15 +205,15 @@ def test_shift_and_similarity_match_the_slow_reference(n, seed):
     shift = shift_between(a, b, TUNING)
     size, overlap = shape_similarity(a, b, TUNING)
     for k in range(n):
-        np.testing.assert_allclose(shift[k], slow_shift(a[:, k], b[:, k]), atol=1e-9)
-        np.testing.assert_allclose((size[k], overlap[k]), slow_similarity(a[:, k], b[:, k]), atol=1e-9)
+        assert_allclose(shift[k], slow_shift(a[:, k], b[:, k]), atol=1e-9)
+        assert_allclose((size[k], overlap[k]), slow_similarity(a[:, k], b[:, k]), atol=1e-9)
 
 
 @pytest.mark.parametrize("growth", [[2.0, 1.5, 0, 0, 0, 0, 0, 0], [0, 1.0, 2.0, 1.0, 0, 0, 0, 0]])
 def test_growth_at_one_end_is_no_displacement(growth):
     before = np.ones((8, 1))
     after = before + np.array(growth)[:, None]
-    np.testing.assert_allclose(shift_between(before, after, TUNING), 0, atol=1e-9)
+    assert_allclose(shift_between(before, after, TUNING), 0, atol=1e-9)
 
 
 def shapes(rng, kdop):
@@ -246,7 +247,7 @@ def test_costs_equal_those_of_pairs_one_by_one(seed, n):
         height = abs(a.top[i] - b.top[j]) + abs(a.bottom[i] - b.bottom[j])
         count = abs(a.log_points[i] - b.log_points[j])
         shape = 1.5 * size + 0.8 * (1 - overlap) + 2.0 * height / 2 + 0.5 * count
-        np.testing.assert_allclose(cost, displacement + shape, atol=1e-9)
+        assert_allclose(cost, displacement + shape, atol=1e-9)
         assert overlap - 1e-9 <= covered <= 1
 
 

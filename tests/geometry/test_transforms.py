@@ -4,6 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from modt.geometry import (
@@ -36,10 +37,10 @@ half_turns = st.sampled_from([np.eye(4)[i] for i in range(4)])
 @given(turns | half_turns)
 def test_quaternions_are_those_of_scipy(quaternion):
     R = Rotation.from_quat(quaternion).as_matrix()
-    np.testing.assert_allclose(rotation_of(quaternion), R, atol=1e-12)
+    assert_allclose(rotation_of(quaternion), R, atol=1e-12)
     found = quaternion_of(se3(R, np.zeros(3)))
     expected = quaternion / np.linalg.norm(quaternion)
-    np.testing.assert_allclose(found * np.sign(found @ expected), expected, atol=1e-7)
+    assert_allclose(found * np.sign(found @ expected), expected, atol=1e-7)
 
 
 @given(turns, turns | half_turns, st.floats(-2, 2))
@@ -50,7 +51,7 @@ def test_a_share_of_a_turn_is_that_of_its_rotation_vector(q, turn, share):
     if rotation.magnitude() > np.pi - 1e-3:  # either way round
         return
     found = turn_between(se3(a.as_matrix(), np.ones(3)), se3((a * rotation).as_matrix(), np.ones(3)), share)
-    np.testing.assert_allclose(found, (a * part).as_matrix(), atol=1e-6)
+    assert_allclose(found, (a * part).as_matrix(), atol=1e-6)
 
 
 @given(angle)
@@ -63,9 +64,9 @@ def test_wrapped_angles_keep_their_direction(a):
 @given(angle, angle, angle, st.tuples(metre, metre, metre))
 def test_angles_of_a_transform_are_those_of_scipy_and_its_inverse_undoes_it(roll, pitch, yaw, position):
     T = se3(rotation_zyx(roll, pitch, yaw), np.array(position))
-    np.testing.assert_allclose(T[:3, :3], Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix(), atol=1e-9)
-    np.testing.assert_allclose(T @ inverse(T), np.eye(4), atol=1e-9)
-    np.testing.assert_allclose(wrap(yaw_of(se3(rotation_zyx(roll, 0.1, yaw), np.zeros(3))) - yaw), 0.0, atol=1e-9)
+    assert_allclose(T[:3, :3], Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix(), atol=1e-9)
+    assert_allclose(T @ inverse(T), np.eye(4), atol=1e-9)
+    assert_allclose(wrap(yaw_of(se3(rotation_zyx(roll, 0.1, yaw), np.zeros(3))) - yaw), 0.0, atol=1e-9)
 
 
 @given(planar, boxes)

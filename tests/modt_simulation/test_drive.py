@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from modt.cli.main import main
 from modt.geometry import inverse, transform, transform_boxes, wrap
@@ -29,14 +30,14 @@ def test_points_times_poses_and_camera_are_read_back(drive, layout):
     first_read = frames[0]
     first = sweeps[0][0]
     for mine, (frame, _) in zip(frames, sweeps, strict=True):
-        np.testing.assert_array_equal(mine.points, frame.points)
+        assert_array_equal(mine.points, frame.points)
         assert mine.stamp_s == pytest.approx(frame.stamp_s, abs=1e-6)
-        np.testing.assert_allclose(
+        assert_allclose(
             inverse(first_read.T_world_sensor) @ mine.T_world_sensor,
             inverse(first.T_world_sensor) @ frame.T_world_sensor,
             atol=1e-4,
         )
-    np.testing.assert_allclose(read.info.camera.P_image_sensor, stream.info.camera.P_image_sensor, atol=1e-9)
+    assert_allclose(read.info.camera.P_image_sensor, stream.info.camera.P_image_sensor, atol=1e-9)
     assert read.info.notes == read.info.pose_notes == ()
 
 
@@ -46,7 +47,7 @@ def test_the_timestamps_tell_whether_sweeps_are_distorted(tmp_path, distort, tur
     assert [frame.turn_s for frame in stream] == [turn_s] * 3
     writer = written(tmp_path, stream)
     read = open_stream(writer.drive)
-    np.testing.assert_allclose([f.turn_s for f in read], turn_s, atol=1e-9)
+    assert_allclose([f.turn_s for f in read], turn_s, atol=1e-9)
     starts, stamps = ((writer.drive / "velodyne_points" / f"timestamps{k}.txt").read_text() for k in ("_start", ""))
     assert (starts == stamps) is not distort
 
@@ -73,7 +74,7 @@ def test_tracklets_of_a_walking_robot_hold_the_points_of_their_bodies(tmp_path):
         placed = transform_boxes(T @ inverse(labelled.T_box_sensor), labelled.box)
         for box in placed:
             body = np.argmin(np.linalg.norm(truth.world_boxes[:, :3] - box[:3], axis=1))
-            np.testing.assert_allclose(truth.world_boxes[body, :6], box[:6], atol=1e-5)
+            assert_allclose(truth.world_boxes[body, :6], box[:6], atol=1e-5)
             assert abs(wrap(truth.world_boxes[body, 6] - box[6])) < 1e-5
             points = transform(T, frame.points[truth.instance == truth.bodies[body], :3].astype(np.float64))
             inside += np.count_nonzero(within(points, box, foot_m=-0.15))
@@ -86,10 +87,10 @@ def test_labels_hold_class_and_instance(drive):
     writer, _, sweeps = drive
     for frame, truth in sweeps[:3]:
         packed = np.fromfile(writer.sequence / "labels" / f"{frame.index:06d}.label", np.uint32)
-        np.testing.assert_array_equal(packed & 0xFFFF, truth.semantic)
+        assert_array_equal(packed & 0xFFFF, truth.semantic)
         number = (packed >> 16).astype(int)
         for row, body in enumerate(truth.bodies):
-            np.testing.assert_array_equal(number == row + 1, truth.instance == body)
+            assert_array_equal(number == row + 1, truth.instance == body)
 
 
 def test_an_existing_drive_is_not_overwritten(tmp_path, capsys):

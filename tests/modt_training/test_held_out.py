@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.special import softmax
 
 from modt.classification.crops import Crops
@@ -61,12 +62,12 @@ def test_every_sensor_counts_as_much_as_the_others():
     truth = truth_of(label[4:], np.array([0, 0, 0, 9]), row=np.array([5, NONE, 7, 4]))
     columns = {"sensor": sensor, "sensor_names": ("a", "b"), "partial": partial, "variant": variant}
     valid = Validation.of(single_points(label, truth=truth, **columns))
-    np.testing.assert_allclose(valid.weight, [1 / 8] * 4 + [0, 1 / 4, 1 / 4])
-    np.testing.assert_allclose(valid.class_frequency, [3 / 8, 3 / 8, 1 / 4, 0])
+    assert_allclose(valid.weight, [1 / 8] * 4 + [0, 1 / 4, 1 / 4])
+    assert_allclose(valid.class_frequency, [3 / 8, 3 / 8, 1 / 4, 0])
     assert valid.truth.row.tolist() == [5, NONE, NONE]  # crop 7 and drive 9 are not validated
     some = valid.weight_of(valid.sensor == 1)
     assert not some[:5].any()
-    np.testing.assert_allclose(np.bincount(valid.label, some)[1:] * 5 / 8, [3 / 8, 1 / 4])  # as often as among all
+    assert_allclose(np.bincount(valid.label, some)[1:] * 5 / 8, [3 / 8, 1 / 4])  # as often as among all
 
 
 def test_the_box_tells_objects_from_background_alone():
@@ -79,7 +80,7 @@ def test_the_box_tells_objects_from_background_alone():
     assert weights.reflectance == 0.0
     posterior = softmax(log_posterior, axis=1)
     assert posterior[label == 0, 0].min() > 0.9
-    np.testing.assert_allclose(posterior[:, 1], posterior[:, 3])
+    assert_allclose(posterior[:, 1], posterior[:, 3])
 
 
 def test_calibration_recovers_temperature_and_class_offsets():
@@ -102,10 +103,8 @@ def test_calibration_folds_into_the_last_layer():
     weight = rng.normal(size=(8, 4))
     bias = rng.normal(size=4)
     *hidden, folded = calibration.fold_into([(weight, bias), (weight, bias)])
-    np.testing.assert_allclose(hidden[0][0], weight, atol=1e-6)
-    np.testing.assert_allclose(
-        IDENTITY.apply(x @ folded[0] + folded[1]), calibration.apply(x @ weight + bias), atol=1e-5
-    )
+    assert_allclose(hidden[0][0], weight, atol=1e-6)
+    assert_allclose(IDENTITY.apply(x @ folded[0] + folded[1]), calibration.apply(x @ weight + bias), atol=1e-5)
 
 
 def test_recall_counts_the_objects_called_right_at_the_precision():
@@ -146,4 +145,4 @@ def test_scores_are_of_the_posterior_under_the_class_frequency_of_the_sensor():
 def test_a_class_that_is_absent_keeps_the_assumed_frequency():
     assumed = np.array([0.7, 0.1, 0.1, 0.1])
     found = shift(np.array([0.5, 0.5, 0.0, 0.0]), assumed)
-    np.testing.assert_allclose(found, np.log([0.5 / 0.7, 5.0, 1.0, 1.0]))
+    assert_allclose(found, np.log([0.5 / 0.7, 5.0, 1.0, 1.0]))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from modt.app.assembly import MODES, chosen_kernels, pipeline
 from modt.classes import ObjectClass
@@ -99,8 +100,8 @@ def test_a_car_seen_at_a_corner_is_found_whole(estimator):
     scene = Scene(estimator, [ObjectClass.CAR])
     for _ in range(20):
         (box,) = scene.show([visible_points(CAR)], [CAR[6]])
-    np.testing.assert_allclose(box[:2], CAR[:2], atol=0.1)
-    np.testing.assert_allclose(box[3:6], CAR[3:6], atol=0.15)
+    assert_allclose(box[:2], CAR[:2], atol=0.1)
+    assert_allclose(box[3:6], CAR[3:6], atol=0.15)
     assert angle(box[6], CAR[6]) < 0.02
     assert not scene.own.heading_known[0]
 
@@ -110,8 +111,8 @@ def test_a_car_of_which_the_rear_is_seen_reaches_away_from_the_sensor(estimator)
     for _ in range(20):
         (box,) = scene.show([visible_points(REAR, ["near"])], [np.pi / 2])
     assert angle(box[6], REAR[6]) < 0.02
-    np.testing.assert_allclose(box[3:5], REAR[3:5], atol=0.2)
-    np.testing.assert_allclose(box[:2], REAR[:2], atol=0.15)
+    assert_allclose(box[3:5], REAR[3:5], atol=0.2)
+    assert_allclose(box[:2], REAR[:2], atol=0.15)
 
 
 def test_what_moves_heads_where_it_goes(estimator):
@@ -121,7 +122,7 @@ def test_what_moves_heads_where_it_goes(estimator):
         boxes = scene.show([visible_points(CAR), visible_points(WALKER)], [CAR[6], WALKER[6]])
     assert angle(boxes[1, 6], WALKER[6], 2 * np.pi) < 0.1
     assert scene.own.heading_known.all()
-    np.testing.assert_allclose(boxes[1, :2], WALKER[:2], atol=0.25)
+    assert_allclose(boxes[1, :2], WALKER[:2], atol=0.25)
     assert angle(boxes[0, 6], CAR[6] - np.pi, 2 * np.pi) < 0.2  # a car that reverses, as far as one can tell
 
 
@@ -165,21 +166,21 @@ def test_a_box_that_was_turned_wrongly_turns_once_the_long_side_is_seen(estimato
         (box,) = scene.show([visible_points(CAR)], [CAR[6]])
     assert angle(first[6], CAR[6] + np.pi / 2) < 0.1  # headings are tried at every 5 degrees
     assert angle(box[6], CAR[6]) < 0.05
-    np.testing.assert_allclose(box[3:5], CAR[3:5], atol=0.3)
+    assert_allclose(box[3:5], CAR[3:5], atol=0.3)
 
 
 def test_the_box_of_a_hidden_track_moves_on_with_it(estimator):
     scene = Scene(estimator, [ObjectClass.CAR])
     (seen,) = scene.show([visible_points(CAR)], [CAR[6]])
     (hidden,) = scene.hide([1.0, -0.5])
-    np.testing.assert_allclose(hidden[:2] - seen[:2], [1.0, -0.5])
-    np.testing.assert_array_equal(hidden[2:], seen[2:])
+    assert_allclose(hidden[:2] - seen[:2], [1.0, -0.5])
+    assert_array_equal(hidden[2:], seen[2:])
 
 
 def test_background_has_the_box_last_seen(estimator):
     scene = Scene(estimator, [ObjectClass.BACKGROUND])
     (box,) = scene.show([visible_points(CAR)], [CAR[6]])
-    np.testing.assert_array_equal(box, scene.motion.box[0])
+    assert_array_equal(box, scene.motion.box[0])
 
 
 def test_the_box_stands_on_the_ground(estimator):
@@ -206,7 +207,7 @@ def test_merged_objects_leave_the_size_as_it_was(estimator):
     merged = CAR.copy()
     merged[3:5] = 9.0, 4.0
     (box,) = scene.show([visible_points(merged)], [CAR[6]])
-    np.testing.assert_allclose(box[3:5], before[3:5])
+    assert_allclose(box[3:5], before[3:5])
 
 
 def test_compiled_boxes_are_those_of_numpy_to_the_byte(monkeypatch):
@@ -235,15 +236,15 @@ def test_compiled_boxes_are_those_of_numpy_to_the_byte(monkeypatch):
             scene.motion.velocity_covariance[:] = covariance @ covariance.transpose(0, 2, 1)
             scene.show(groups, boxes[:, 6])
         for name, column in scenes[0].own.columns().items():
-            np.testing.assert_array_equal(column, getattr(scenes[1].own, name), err_msg=name)
+            assert_array_equal(column, getattr(scenes[1].own, name), err_msg=name)
         if rng.random() < 0.3:
-            np.testing.assert_array_equal(*(scene.hide([0.1, 0.2]) for scene in scenes))
+            assert_array_equal(*(scene.hide([0.1, 0.2]) for scene in scenes))
 
 
 def test_the_paper_s_tracks_have_the_boxes_seen():
     scene = Scene(SeenBoxes(), [ObjectClass.CAR])
     (box,) = scene.show([visible_points(CAR)], [CAR[6]])
-    np.testing.assert_array_equal(box, scene.motion.box[0])
+    assert_array_equal(box, scene.motion.box[0])
 
 
 def test_every_track_of_a_drive_has_a_box():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
 
 from modt.geometry import inverse, rotation_zyx, se3, transform_boxes, yaw_of
 from modt.observations import observe
@@ -54,7 +55,7 @@ def test_the_path_is_found_among_stationary_objects_though_others_move(moving, f
     assert distance < most * 0.8 * (frames - 1)
     assert turn < most_deg
     R = follower.T_world_sensor[:3, :3]
-    np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-12)
+    assert_allclose(R @ R.T, np.eye(3), atol=1e-12)
 
 
 T_OTHER = se3(rotation_zyx(0, 0, 2.0), np.array([400.0, -90.0, 0.0]))
@@ -74,7 +75,7 @@ def test_no_track_is_moved_where_poses_are_missing_begin_late_or_restart(given):
     assert len(follower.tracks) == N_OBJECTS
     assert follower.tracks.age.min() == 20
     T_world_start = T_OTHER if given.startswith("first") else EYE
-    np.testing.assert_allclose(follower.T_world_sensor, T_world_start @ gentle_curve(19), atol=0.15)
+    assert_allclose(follower.T_world_sensor, T_world_start @ gentle_curve(19), atol=0.15)
 
 
 def test_a_roll_or_a_climb_does_not_go_on_where_poses_end():
@@ -94,7 +95,7 @@ def test_a_world_stays_upright_where_poses_begin_again():
         return gentle_curve(i) @ se3(rotation_zyx(0.01 * i, 0.0, 0.0), np.zeros(3))
 
     follower = drive(20, given=lambda i: (None if 6 <= i < 14 else rolling(i), i >= 14))
-    np.testing.assert_allclose(follower.T_world_sensor[2, :3], rolling(19)[2, :3], atol=1e-9)
+    assert_allclose(follower.T_world_sensor[2, :3], rolling(19)[2, :3], atol=1e-9)
 
 
 def test_without_landmarks_the_last_motion_continues():
@@ -102,7 +103,7 @@ def test_without_landmarks_the_last_motion_continues():
     before = follower.T_world_sensor.copy()
     follower.follow(*frame_of([], 10, None))
     step = inverse(before) @ follower.T_world_sensor
-    np.testing.assert_allclose(step, inverse(gentle_curve(8)) @ gentle_curve(9), atol=0.05)
+    assert_allclose(step, inverse(gentle_curve(8)) @ gentle_curve(9), atol=0.05)
 
 
 @pytest.mark.parametrize(
@@ -180,7 +181,7 @@ def test_observations_are_brought_onto_their_landmarks_though_ends_came_into_vie
     ahead = rng.random((4, 60)) < 0.5
     kdop = grown.kdop + np.concatenate([ahead, ~ahead]) * grown_m * rng.exponential(1.0, (8, 60))
     correction = Registration().correct(landmarks_of(world), replace(grown, kdop=kdop))
-    np.testing.assert_allclose(correction @ T, EYE, atol=0.01 + grown_m / 6)
+    assert_allclose(correction @ T, EYE, atol=0.01 + grown_m / 6)
 
 
 def moved(*xy):
@@ -192,7 +193,7 @@ def moved(*xy):
 def test_too_few_landmarks_give_no_correction(n):
     world = street(n=30)
     correction = Registration().correct(landmarks_of(world[:n]), observed(world, moved(0.3, 0.0)))
-    np.testing.assert_array_equal(correction, EYE)
+    assert_array_equal(correction, EYE)
 
 
 def test_a_correction_beyond_the_reach_is_refused():
@@ -200,9 +201,9 @@ def test_a_correction_beyond_the_reach_is_refused():
     reach_m = REACH_M / np.sqrt(2)  # along each axis
     refused = moved(1.2 * reach_m, 1.2 * reach_m)
     accepted = moved(0.8 * reach_m, 0.8 * reach_m)
-    np.testing.assert_array_equal(Registration().correct(landmarks_of(world), observed(world, refused)), EYE)
+    assert_array_equal(Registration().correct(landmarks_of(world), observed(world, refused)), EYE)
     correction = Registration().correct(landmarks_of(world), observed(world, accepted))
-    np.testing.assert_allclose(correction @ accepted, EYE, atol=0.02)
+    assert_allclose(correction @ accepted, EYE, atol=0.02)
 
 
 def test_the_mean_of_an_end_restarts_where_another_one_comes_into_view():
@@ -215,7 +216,7 @@ def test_the_mean_of_an_end_restarts_where_another_one_comes_into_view():
     assert landmarks.established.tolist() == [True, False]
     mean = kdop[0] + 0.075  # of four views
     mean[2] = kdop[0, 2]
-    np.testing.assert_allclose(landmarks.kdop.T, [mean, kdop[1]])  # the one that was never observed is predicted
+    assert_allclose(landmarks.kdop.T, [mean, kdop[1]])  # the one that was never observed is predicted
 
 
 def test_landmarks_are_candidates_at_rest_by_their_ids():
@@ -228,7 +229,7 @@ def test_landmarks_are_candidates_at_rest_by_their_ids():
     at_rest = static_tracks(kdop, ids=[5, 7, 9])
     landmarks = landmark_map.update(replace(at_rest, stationary=np.array([True, False, True])))
     assert landmarks.established.tolist() == [True, False, False]
-    np.testing.assert_allclose(landmarks.kdop.T, kdop)
+    assert_allclose(landmarks.kdop.T, kdop)
     for frames in range(1, ESTABLISHED_FRAMES + 1):  # at rest again: the mean restarts
         assert landmark_map.update(at_rest).established[1] == (frames >= ESTABLISHED_FRAMES)
     landmark_map.clear()

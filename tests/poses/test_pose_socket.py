@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose
 
 from modt.address import parse_address
 from modt.config import OdometryConfig
@@ -87,7 +88,7 @@ def test_any_datagrams_are_counted_once_and_a_pose_is_finite(events):
                 T = pose_of(odometry, frame(event))
                 frames += 1
                 assert T is None or np.isfinite(T).all()
-                np.testing.assert_allclose(np.eye(3) if T is None else T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=0.02)
+                assert_allclose(np.eye(3) if T is None else T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=0.02)
         report = odometry.report()
     assert report["received"] == sent == report["used"] + sum(report["refused"].values())
     assert report["frames_posed"] + report["frames_unposed"] == frames
@@ -100,7 +101,7 @@ def test_both_forms_give_the_same_pose():
     for raw in (planar(1.5, 1.0, 2.0, 0.5), json.dumps(flat).encode(), json.dumps(short).encode()):
         stamp_s, read = read_datagram(raw)
         assert stamp_s == 1.5
-        np.testing.assert_allclose(read, T, atol=1e-12)
+        assert_allclose(read, T, atol=1e-12)
 
 
 def test_an_orientation_gives_roll_and_pitch():
@@ -108,7 +109,7 @@ def test_an_orientation_gives_roll_and_pitch():
     raw = json.dumps({"stamp": 1.5, "x": 1, "y": 2, "orientation": quaternion_of(T).tolist()}).encode()
     stamp_s, read = read_datagram(raw)
     assert stamp_s == 1.5
-    np.testing.assert_allclose(read, T, atol=1e-12)
+    assert_allclose(read, T, atol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from modt.errors import MisuseError
@@ -32,7 +33,7 @@ def write(path, poses):
 @given(st.lists(pose, min_size=1, max_size=5))
 def test_poses_are_read_back(tmp_path_factory, poses):
     path = write(tmp_path_factory.mktemp("poses") / "p.txt", poses)
-    np.testing.assert_allclose(read_poses(path), poses, atol=1e-9)
+    assert_allclose(read_poses(path), poses, atol=1e-9)
 
 
 GOOD = "1 0 0 0 0 1 0 0 0 0 1 0\n"
@@ -62,9 +63,9 @@ def test_camera_poses_are_converted_and_sensor_poses_unchanged(tmp_path):
     frame = next(iter(open_stream(layouts.bare(tmp_path))))
     T_sensor = se3(rotation_zyx(0.01, -0.02, 0.7), np.array([3.0, -2.0, 0.1]))
     path = write(tmp_path / "p.txt", [T_CAMERA_SENSOR @ T_sensor @ inverse(T_CAMERA_SENSOR)])
-    np.testing.assert_allclose(PoseFile(path, CAMERA, 1).place(frame).T_world_sensor, T_sensor, atol=1e-9)
+    assert_allclose(PoseFile(path, CAMERA, 1).place(frame).T_world_sensor, T_sensor, atol=1e-9)
     path = write(tmp_path / "q.txt", [T_sensor])
-    np.testing.assert_allclose(PoseFile(path, None, 1).place(frame).T_world_sensor, T_sensor, atol=1e-9)
+    assert_allclose(PoseFile(path, None, 1).place(frame).T_world_sensor, T_sensor, atol=1e-9)
 
 
 def test_a_line_belongs_to_the_frame_of_its_index(tmp_path):
@@ -111,4 +112,4 @@ def test_poses_of_oxts_records_equal_those_of_the_development_kit(rows):
     scale = math.cos(rows[0, 0] * math.pi / 180)
     origin = np.linalg.inv(mercator_pose(rows[0], scale))
     expected = np.stack([origin @ mercator_pose(r, scale) for r in rows])
-    np.testing.assert_allclose(oxts_poses(rows), expected, atol=1e-6)
+    assert_allclose(oxts_poses(rows), expected, atol=1e-6)

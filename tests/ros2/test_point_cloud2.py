@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
 
 from modt.ros2.cdr import MessageError
 from modt.ros2.point_cloud2 import read_cloud, turn_of, write_cloud
@@ -45,7 +46,7 @@ def test_any_layout_is_read_as_point_by_point(points, padding, little):
     cloud = read_cloud(raw)
     expected = np.array([[point[name] for name in "xyz"] for point in points.reshape(-1)], np.float32)
     expected[~np.isfinite(expected).all(axis=1)] = 0.0  # no return
-    np.testing.assert_array_equal(cloud.points[:, :3], expected)
+    assert_array_equal(cloud.points[:, :3], expected)
     assert (cloud.stamp_s, cloud.frame_id) == (1.0, "lidar")
     assert cloud.points.dtype == np.float32
     assert cloud.points.flags.writeable
@@ -71,7 +72,7 @@ def test_reflectances_are_scaled_by_what_they_span(kind, values, expected):
     layout = [("x", "f4"), ("y", "f4"), ("z", "f4"), ("intensity", kind)]
     points = messages.xyzi(100, layout)
     points["intensity"] = values
-    np.testing.assert_allclose(read_cloud(messages.encode(messages.cloud(points))).points[:, 3], expected, atol=1e-6)
+    assert_allclose(read_cloud(messages.encode(messages.cloud(points))).points[:, 3], expected, atol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -99,8 +100,8 @@ def test_a_written_cloud_is_read_by_another_implementation():
     assert (message.header.stamp.sec, message.header.stamp.nanosec) == (12, 500_000_000)
     assert [field.name for field in message.fields] == ["x", "y", "z", "intensity"]
     assert (message.height, message.width, message.point_step, message.row_step) == (1, 30, 16, 480)
-    np.testing.assert_array_equal(message.data.view(np.float32).reshape(-1, 4), points)
-    np.testing.assert_array_equal(read_cloud(write_cloud(12.5, "lidar", points)).points, points)
+    assert_array_equal(message.data.view(np.float32).reshape(-1, 4), points)
+    assert_array_equal(read_cloud(write_cloud(12.5, "lidar", points)).points, points)
     assert len(messages.decode(write_cloud(12.5, "lidar", points[:0]), "sensor_msgs/msg/PointCloud2").data) == 0
 
 
@@ -160,7 +161,7 @@ def test_a_sensor_without_a_head_is_stamped_in_the_middle_of_its_times_and_each_
     assert (cloud.turn_s, cloud.stamp_s) == (0.0, pytest.approx(middle_s, abs=2e-4))
     wild = np.isnan(points["timestamp"].reshape(-1).astype(float))
     delay_s = np.where(wild, 0.0, since_s - 0.05)
-    np.testing.assert_allclose(cloud.delay_s, delay_s, atol=2e-4)
+    assert_allclose(cloud.delay_s, delay_s, atol=2e-4)
 
 
 @pytest.mark.parametrize("odd", [{"turn_s": 3.0, "unit": 1.0}, {"turn_s": 0.0}])
@@ -174,7 +175,7 @@ def test_a_wrong_size_of_a_row_does_not_hide_dense_rows(row_step):
     points = messages.xyzi(40).reshape(4, 10)
     message = messages.cloud(points)
     cloud = read_cloud(messages.encode(dataclasses.replace(message, row_step=row_step)))
-    np.testing.assert_array_equal(cloud.points, read_cloud(messages.encode(message)).points)
+    assert_array_equal(cloud.points, read_cloud(messages.encode(message)).points)
     assert "row_step" in cloud.corrected
 
 
@@ -183,7 +184,7 @@ def test_a_wrong_order_of_bytes_is_known_by_the_coordinates(order):
     layout = [(name, f"{order}f4") for name in ("x", "y", "z", "intensity")]
     message = messages.cloud(messages.xyzi(40, layout))
     cloud = read_cloud(messages.encode(dataclasses.replace(message, is_bigendian=order == "<")))
-    np.testing.assert_array_equal(cloud.points, read_cloud(messages.encode(message)).points)
+    assert_array_equal(cloud.points, read_cloud(messages.encode(message)).points)
     assert "is_bigendian" in cloud.corrected
     assert not read_cloud(messages.encode(message)).corrected
 

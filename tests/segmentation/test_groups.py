@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView, upright_boxes
@@ -57,7 +58,7 @@ def test_headings_and_boxes_are_those_of_each_cluster_alone(seed, sizes):
         x, y, z = points - box[:3, None]
         c, s = np.cos(box[6]), np.sin(box[6])
         reach = np.stack([x * c + y * s, y * c - x * s, z])
-        np.testing.assert_allclose(np.stack([-reach.min(axis=1), reach.max(axis=1)]), [box[3:6] / 2] * 2, atol=1e-4)
+        assert_allclose(np.stack([-reach.min(axis=1), reach.max(axis=1)]), [box[3:6] / 2] * 2, atol=1e-4)
         assert box[3] >= box[4]
 
 
@@ -108,7 +109,7 @@ def test_statistics_of_each_group_are_of_the_returns_with_reflectance(groups: li
         own, expected = np.array([v for v in group if v != UNRECORDED], np.float32), [np.nan] * N_REFLECTANCE
         if len(own):
             expected = [own.mean(), own.std(), own.max(), (own > BRIGHT).mean(), (own < DARK).mean()]
-        np.testing.assert_allclose(row, expected, atol=2e-3)
+        assert_allclose(row, expected, atol=2e-3)
 
 
 @pytest.mark.parametrize("fov", [FieldOfView(), FieldOfView(np.array([[0.0, 1.0, 0.0, 0.0]]))], ids=["full", "left"])
@@ -120,14 +121,14 @@ def test_proposals_have_the_statistics_of_their_returns_with_reflectance(fov: Fi
     assert partly.reflectance is not None
     means = [np.mean(np.where(v < 0, np.nan, v)) for v in np.split(points[partly.members, 3], partly.offsets[1:-1])]
     assert {True, False} == set(np.isnan(means).tolist())
-    np.testing.assert_allclose(partly.reflectance[:, 0], means, atol=1e-5)
-    np.testing.assert_array_equal(np.isnan(partly.reflectance).all(axis=1), np.isnan(means))
+    assert_allclose(partly.reflectance[:, 0], means, atol=1e-5)
+    assert_array_equal(np.isnan(partly.reflectance).all(axis=1), np.isnan(means))
     assert Segmenter(SegmentationConfig(), SensorConfig(), fov).segment(points).reflectance is None  # of no scale
     points[:, 3] = UNRECORDED
     without = stage.segment(points)
     assert without.reflectance is None
-    np.testing.assert_array_equal(without.members, partly.members)
-    np.testing.assert_array_equal(without.box, partly.box)
+    assert_array_equal(without.members, partly.members)
+    assert_array_equal(without.box, partly.box)
 
 
 @given(st.integers(1, 5000), st.floats(0, 1, width=32))

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from numpy.testing import assert_array_equal
 
 from modt import profile
 from modt.config import SegmentationConfig, SensorConfig
@@ -336,9 +337,9 @@ def test_lines_of_sight(kernels, seed, n, rays):
     which = rng.permutation(n)[: rng.integers(0, n + 1)]
     reference, compiled = (sight_of(each, SightTuning(rays=rays)) for each in (NUMPY, kernels))
     nearest = reference.look(points, proposals.kind)
-    np.testing.assert_array_equal(compiled.look(points, proposals.kind), nearest)
+    assert_array_equal(compiled.look(points, proposals.kind), nearest)
     sides = reference.bounded_sides(nearest, proposals, which)
-    np.testing.assert_array_equal(compiled.bounded_sides(nearest, proposals, which), sides)
+    assert_array_equal(compiled.bounded_sides(nearest, proposals, which), sides)
 
 
 @pytest.mark.slow
@@ -381,4 +382,4 @@ def test_people_within_a_cluster_are_the_same(kernels, seed):
     seen = rng.random(len(x)) < rng.uniform(0.3, 1.0)
     high = high + rng.choice([0.0, 0.1], len(x)).astype(np.float32)
     columns = [v[seen] for v in (x, y, low, high, points)]
-    np.testing.assert_array_equal(kernels.find_people(*columns, tuning), NUMPY.find_people(*columns, tuning))
+    assert_array_equal(kernels.find_people(*columns, tuning), NUMPY.find_people(*columns, tuning))

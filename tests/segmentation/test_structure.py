@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.native import library
@@ -66,7 +67,7 @@ def test_what_is_nearer_to_the_sensor_is_before_a_surface():
     y = np.append(np.full(80, 3.0), [2.4, 3.5, 3.0])
     on_surface, before_m = find_surfaces(x, y, np.full_like(x, 0.1), TUNING)
     assert on_surface.tolist() == [True] * 80 + [False] * 3
-    np.testing.assert_allclose(before_m[80:], [0.6, -0.5, np.inf], atol=1e-6)
+    assert_allclose(before_m[80:], [0.6, -0.5, np.inf], atol=1e-6)
 
 
 def test_few_cells_have_no_surface():
@@ -128,8 +129,8 @@ def test_compiled_kernels_find_the_same_parts():
         beam_m = np.full(len(cells), 0.1, np.float32)
         expected, sizes = NUMPY.cluster(clusterer, cells, sampled, beam_m)
         cluster, compiled_sizes = kernels.cluster(clusterer, cells, sampled, beam_m)
-        np.testing.assert_array_equal(cluster, expected)
-        np.testing.assert_array_equal(compiled_sizes.points, sizes.points)
+        assert_array_equal(cluster, expected)
+        assert_array_equal(compiled_sizes.points, sizes.points)
 
 
 @pytest.mark.parametrize("seed", range(3))

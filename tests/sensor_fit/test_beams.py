@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy import ndimage
 from scipy.signal import find_peaks
 
@@ -68,8 +69,8 @@ ROWS = st.lists(st.integers(0, 5000), min_size=1, max_size=600).map(np.array)
 def test_filters_are_those_of_scipy(values, deviation, width):
     values = values / 7
     near = {"rtol": 1e-9, "atol": 1e-9}
-    np.testing.assert_allclose(gaussian(values, deviation), ndimage.gaussian_filter1d(values, deviation), **near)
-    np.testing.assert_allclose(running_mean(values, width), ndimage.uniform_filter1d(values, width), **near)
+    assert_allclose(gaussian(values, deviation), ndimage.gaussian_filter1d(values, deviation), **near)
+    assert_allclose(running_mean(values, width), ndimage.uniform_filter1d(values, width), **near)
 
 
 @pytest.mark.parametrize("smooth", [0, 2, 10])
@@ -78,5 +79,5 @@ def test_peaks_and_prominences_are_those_of_scipy(smooth, count):
     count = ndimage.gaussian_filter1d(np.array(count, float), smooth) if smooth else np.array(count, float)
     peaks, prominence = prominent_peaks(count)
     expected, shape = find_peaks(count, prominence=0)
-    np.testing.assert_array_equal(peaks, expected)
-    np.testing.assert_allclose(prominence, shape["prominences"])
+    assert_array_equal(peaks, expected)
+    assert_allclose(prominence, shape["prominences"])

@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from modt.geometry import rotation_zyx, se3, transform, yaw_of
 from modt.placement import LEVEL, Mount
@@ -59,9 +60,9 @@ def test_points_keep_their_place_in_the_world_and_the_floor_is_flat():
     for frame in walk():
         level = leveller.level(frame)
         assert len(level.points) == len(frame.points)
-        np.testing.assert_array_equal(level.points[:, 3], frame.points[:, 3])
+        assert_array_equal(level.points[:, 3], frame.points[:, 3])
         R = np.eye(3) if level.R_level_sensor is None else level.R_level_sensor
-        np.testing.assert_allclose(level.T_world_sensor @ se3(R, np.zeros(3)), frame.T_world_sensor, atol=1e-9)
+        assert_allclose(level.T_world_sensor @ se3(R, np.zeros(3)), frame.T_world_sensor, atol=1e-9)
     assert level.T_world_sensor[2, 2] > 0.9999
     x, y, z = level.points.T[:3]
     floor = (np.hypot(x, y) < 9) & (np.abs(z + 0.8) < 0.5)
@@ -77,7 +78,7 @@ def test_a_steady_robot_is_turned_by_its_mount_alone(given):
         got = leveller.level(given(frame))
         expected = mount.level(given(frame))
         assert got.points.tobytes() == expected.points.tobytes()
-        np.testing.assert_array_equal(leveller.attitude.R_level_sensor, mount.R_level_sensor)
+        assert_array_equal(leveller.attitude.R_level_sensor, mount.R_level_sensor)
     level = next(iter(SyntheticStream("street", "vlp-16", 0.1, 5)))
     assert Leveller(LEVEL, 0.8, 0.4).level(level) is level
 
@@ -141,9 +142,9 @@ def floor(slope, rate, bend=(0.0, 0.0), depth_m=0.8, n=2000, outliers=0.3):
 def test_slope_and_its_change_are_measured_in_one_sweep(slope_deg, rate_degps, bend_degps2):
     xyz, delay_s = floor(np.deg2rad(slope_deg), np.deg2rad(rate_degps), np.deg2rad(bend_degps2))
     found = floor_slope(xyz, delay_s, np.zeros(2), 0.8)
-    np.testing.assert_allclose(np.rad2deg(found.slope), slope_deg, atol=0.3)
-    np.testing.assert_allclose(np.rad2deg(found.twist[0]), rate_degps, atol=6.0)
-    np.testing.assert_allclose(np.rad2deg(found.twist[1]), bend_degps2, atol=120.0)
+    assert_allclose(np.rad2deg(found.slope), slope_deg, atol=0.3)
+    assert_allclose(np.rad2deg(found.twist[0]), rate_degps, atol=6.0)
+    assert_allclose(np.rad2deg(found.twist[1]), bend_degps2, atol=120.0)
     assert found.depth_m == pytest.approx(0.8, abs=0.03)
 
 

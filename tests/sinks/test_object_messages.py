@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from modt.geometry import rotation_zyx, se3, transform
@@ -47,7 +48,7 @@ def test_what_moves_is_a_detection_whatever_its_class(frame):
     assert {track: name for track, (name, _) in first.items()} == {"1": "car", "2": "pedestrian", "300": "other"}
     assert first["300"][1] == pytest.approx(0.9)
     covariance = found[0].results[0].pose.covariance.reshape(6, 6)
-    np.testing.assert_allclose(np.diag(covariance)[:3], [0.09, 0.01, 0.0], atol=1e-12)
+    assert_allclose(np.diag(covariance)[:3], [0.09, 0.01, 0.0], atol=1e-12)
 
 
 def test_tracked_objects_of_autoware_move_along_their_boxes(frame):
@@ -66,10 +67,10 @@ def test_tracked_objects_of_autoware_move_along_their_boxes(frame):
         }
     )
     at = car.kinematics.pose_with_covariance.pose.position
-    np.testing.assert_allclose([at.x, at.y, at.z], [10.0, 0.0, 0.7], atol=1e-12)
+    assert_allclose([at.x, at.y, at.z], [10.0, 0.0, 0.7], atol=1e-12)
     speed = car.kinematics.twist_with_covariance.twist.linear
-    np.testing.assert_allclose([speed.x, speed.y, speed.z], [5.0, 0.0, 0.0], atol=1e-12)
-    np.testing.assert_allclose(
+    assert_allclose([speed.x, speed.y, speed.z], [5.0, 0.0, 0.0], atol=1e-12)
+    assert_allclose(
         np.diag(car.kinematics.twist_with_covariance.covariance.reshape(6, 6))[:2], [0.25, 0.04], atol=1e-12
     )
     known = object_messages.AVAILABLE, object_messages.SIGN_UNKNOWN
@@ -82,10 +83,10 @@ def test_tracked_objects_of_autoware_move_along_their_boxes(frame):
 
 def test_obstacles_of_nav2_have_velocities_in_the_frame_of_the_message(frame):
     car, _, other = decoded(frame, "nav2").obstacles
-    np.testing.assert_allclose([car.position.x, car.position.y], [10.0, 0.0], atol=1e-12)
-    np.testing.assert_allclose([car.velocity.x, car.velocity.y], [5.0, 0.0], atol=1e-12)
-    np.testing.assert_allclose([other.velocity.x, other.velocity.y], [0.0, 2.0], atol=1e-12)
-    np.testing.assert_allclose([car.size.x, car.size.y, car.size.z], [4.4, 1.8, 1.5], atol=1e-12)
+    assert_allclose([car.position.x, car.position.y], [10.0, 0.0], atol=1e-12)
+    assert_allclose([car.velocity.x, car.velocity.y], [5.0, 0.0], atol=1e-12)
+    assert_allclose([other.velocity.x, other.velocity.y], [0.0, 2.0], atol=1e-12)
+    assert_allclose([car.size.x, car.size.y, car.size.z], [4.4, 1.8, 1.5], atol=1e-12)
     assert other.score == pytest.approx(0.9)
 
 
@@ -105,12 +106,12 @@ def test_velocities_of_a_tilted_sensor_are_along_its_own_axes(frame):
     shown = dataclasses.replace(frame, frame=level, T_world_sensor=level.T_world_sensor)
     car = decoded(shown, "nav2").obstacles[0]
     velocity = np.array([car.velocity.x, car.velocity.y, car.velocity.z])
-    np.testing.assert_allclose(T_world_sensor[:3, :3] @ velocity, [0.0, 5.0, 0.0], atol=1e-9)
+    assert_allclose(T_world_sensor[:3, :3] @ velocity, [0.0, 5.0, 0.0], atol=1e-9)
     place = np.array([[car.position.x, car.position.y, car.position.z]])
-    np.testing.assert_allclose(transform(T_world_sensor, place), [frame.tracks.whole_box[0, :3]], atol=1e-9)
+    assert_allclose(transform(T_world_sensor, place), [frame.tracks.whole_box[0, :3]], atol=1e-9)
     pose = decoded(shown, "autoware").objects[0].kinematics.pose_with_covariance.pose.orientation
     ahead = Rotation.from_quat([pose.x, pose.y, pose.z, pose.w]).apply([1.0, 0.0, 0.0])
-    np.testing.assert_allclose(T_world_sensor[:3, :3] @ ahead, [0.0, 1.0, 0.0], atol=1e-9)
+    assert_allclose(T_world_sensor[:3, :3] @ ahead, [0.0, 1.0, 0.0], atol=1e-9)
 
 
 def test_tracks_of_another_run_have_another_identity(frame):

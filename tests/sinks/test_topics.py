@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from modt.geometry import rotation_zyx, se3, transform
 from modt.placement import Mount
@@ -70,7 +71,7 @@ def test_a_detection_has_its_box_and_the_reported_class_first_though_another_is_
     turned = found.bbox.center.orientation
     size = found.bbox.size
     assert (at.x, at.y, at.z, size.x, size.y, size.z) == (10.0, -2.0, -1.0, 4.0, 1.8, 1.5)
-    np.testing.assert_allclose([turned.x, turned.y, turned.z, turned.w], [0, 0, np.sin(0.25), np.cos(0.25)])
+    assert_allclose([turned.x, turned.y, turned.z, turned.w], [0, 0, np.sin(0.25), np.cos(0.25)])
     assert found.results[0].pose.pose == found.bbox.center
 
 
@@ -108,7 +109,7 @@ def test_the_pose_of_the_sensor_is_an_odometry_and_a_transform():
     tree = Transforms()
     tree.add(encoded["/tf"])
     for T in (tree.between("map", "lidar"), read_odometry(encoded["/modt/odometry"]).T_odom_child):
-        np.testing.assert_allclose(T, PLACED, atol=1e-12)
+        assert_allclose(T, PLACED, atol=1e-12)
 
 
 def test_points_of_a_tilted_sensor_are_as_it_sent_them_and_in_their_place_in_the_world():
@@ -117,13 +118,13 @@ def test_points_of_a_tilted_sensor_are_as_it_sent_them_and_in_their_place_in_the
     frame = dataclasses.replace(LABELLED, frame=tilted, T_world_sensor=tilted.T_world_sensor)
     encoded = {topic.name: topic.encode(frame) for topic in topics(TopicOptions(points=True, obstacles=True))}
     points = read_cloud(encoded["/modt/points"]).points
-    np.testing.assert_allclose(points[:, :3], level.points[:, :3], atol=1e-4)
+    assert_allclose(points[:, :3], level.points[:, :3], atol=1e-4)
     standing = read_cloud(encoded["/modt/obstacles"]).points
-    np.testing.assert_allclose(standing[:, :3], level.points[frame.obstacles(), :3], atol=1e-4)
+    assert_allclose(standing[:, :3], level.points[frame.obstacles(), :3], atol=1e-4)
     T = read_odometry(encoded["/modt/odometry"]).T_odom_child
     inside = points[:, :3].astype(np.float64)
     placed = tilted.points[:, :3].astype(np.float64)
-    np.testing.assert_allclose(transform(T, inside), transform(tilted.T_world_sensor, placed), atol=1e-3)
+    assert_allclose(transform(T, inside), transform(tilted.T_world_sensor, placed), atol=1e-3)
 
 
 def rows_of(message):
@@ -150,7 +151,7 @@ def test_obstacles_and_ground_are_points_with_the_track_or_the_kind_and_the_clas
     assert found.dtype.names == ("x", "y", "z", "track", "class")
     for points, rows in ((found, LABELLED.obstacles()), (ground, np.flatnonzero(labels == PointKind.GROUND))):
         xyz = np.column_stack([points[axis] for axis in "xyz"])
-        np.testing.assert_array_equal(xyz, LABELLED.frame.points[rows, :3])
+        assert_array_equal(xyz, LABELLED.frame.points[rows, :3])
         assert points["track"].tolist() == labels[rows].tolist()
     classes = dict(zip(found["track"].tolist(), found["class"].tolist(), strict=True))
     assert classes == {1: 1, 12: 2, 1234567: 0, **dict.fromkeys(OBSTACLES, 0)}

@@ -9,6 +9,7 @@ from contextlib import closing, nullcontext
 import numpy as np
 import pytest
 import zstandard
+from numpy.testing import assert_allclose, assert_array_equal
 
 from modt.errors import MisuseError, ModtError
 from modt.sources.recognise import open_stream
@@ -40,7 +41,7 @@ def test_sweeps_are_frames_and_stamps_count_from_the_first(opened):
     assert [frame.stamp_s for frame in frames] == pytest.approx([0.0, 0.1, 0.2, 0.3], abs=1e-6)
     for k, frame in enumerate(frames):
         expected = messages.xyzi(20 + k).view(np.float32).reshape(-1, 4)
-        np.testing.assert_array_equal(frame.points, expected)
+        assert_array_equal(frame.points, expected)
     assert stream.info.has_poses  # interpolated at the stamps of the sweeps
     assert x_of(frames) == pytest.approx([10.0, 10.1, 10.2, 10.3], abs=1e-6)
 
@@ -50,8 +51,8 @@ def test_the_mount_of_the_sensor_is_taken_from_the_static_transforms(opened):
     mount = messages.encode(messages.transforms(("base_link", "lidar", [1.0, 0.0, 2.0], turned)))
     recorded = by_time(clouds(), poses("base_link"), [("/tf_static", TF, BEGAN_S - 1, mount)])
     first = next(iter(opened(recorded)))
-    np.testing.assert_allclose(first.T_world_sensor[:3, 3], [11.0, 0.0, 2.0], atol=1e-6)
-    np.testing.assert_allclose(first.T_world_sensor[:3, 0], [0.0, 1.0, 0.0], atol=1e-6)
+    assert_allclose(first.T_world_sensor[:3, 3], [11.0, 0.0, 2.0], atol=1e-6)
+    assert_allclose(first.T_world_sensor[:3, 0], [0.0, 1.0, 0.0], atol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -261,8 +262,8 @@ def test_a_compressed_recording_has_the_frames_of_the_plain_one(compressed, tmp_
     for path in (folder, file):  # with metadata.yaml and without
         for a, b in zip(plain, open_stream(path), strict=True):
             assert (a.index, a.stamp_s) == (b.index, b.stamp_s)
-            np.testing.assert_array_equal(a.points, b.points)
-            np.testing.assert_array_equal(a.T_world_sensor, b.T_world_sensor)
+            assert_array_equal(a.points, b.points)
+            assert_array_equal(a.T_world_sensor, b.T_world_sensor)
 
 
 def test_the_unpacked_file_goes_with_the_stream(tmp_path, monkeypatch):
@@ -348,9 +349,9 @@ def test_messages_of_livox_own_type_are_read_with_the_times_of_their_points(open
     ]
     frames = [*opened(by_time(recorded, poses("livox_frame")))]
     assert len(frames) == 5
-    np.testing.assert_allclose(frames[1].points[:, 1:3], xyz[:, 1:], atol=1e-6)
+    assert_allclose(frames[1].points[:, 1:3], xyz[:, 1:], atol=1e-6)
     since_middle_s = np.linspace(-0.05, 0.05, 500, endpoint=False)
-    np.testing.assert_allclose(frames[1].points[:, 0], xyz[:, 0] + since_middle_s, atol=1e-3)  # at 1 m/s along x
+    assert_allclose(frames[1].points[:, 0], xyz[:, 0] + since_middle_s, atol=1e-3)  # at 1 m/s along x
     assert frames[1].points[0, 3] == pytest.approx(77 / 255)
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from modt.errors import ScanError
 from modt.ros2.point_cloud2 import read_cloud
@@ -63,15 +64,15 @@ def test_a_pcd_of_padded_memory_is_read(tmp_path):
     rows = table(x="f4", y="f4", z="f4", gap="u4", intensity="f4", ring="u2", rest="u4")
     head = {"FIELDS": "x y z _ intensity ring _", "SIZE": "4 4 4 1 4 2 1", "TYPE": "F F F U F U U"}
     points, _ = read(tmp_path / "scan.pcd", pcd(rows, **head, COUNT="1 1 1 4 1 1 4"))
-    np.testing.assert_allclose(points[:, :3], np.arange(5)[:, None] + [0, 1, 2])
-    np.testing.assert_allclose(points[:, 3], rows["intensity"] / 255, atol=1e-6)
+    assert_allclose(points[:, :3], np.arange(5)[:, None] + [0, 1, 2])
+    assert_allclose(points[:, 3], rows["intensity"] / 255, atol=1e-6)
 
 
 def test_columns_of_any_order_and_type(form):
     points, flaws = form(table(ring="u2", z="f8", time="f4", reflectivity="u2", x="f8", intensity="f4", y="f4"))
     assert (points.dtype, flaws) == (np.float32, [])
-    np.testing.assert_allclose(points[:, :3], np.arange(5)[:, None] + [4, 6, 1])
-    np.testing.assert_allclose(points[:, 3], (50 * np.arange(5) + 3) / 255, atol=1e-7)
+    assert_allclose(points[:, :3], np.arange(5)[:, None] + [4, 6, 1])
+    assert_allclose(points[:, 3], (50 * np.arange(5) + 3) / 255, atol=1e-7)
 
 
 @pytest.mark.parametrize(
@@ -87,7 +88,7 @@ def test_columns_of_any_order_and_type(form):
 def test_reflectance_is_scaled(form, kind, values, reflectance):
     rows = table(x="f4", y="f4", z="f4", i=kind)
     rows["i"] = values
-    np.testing.assert_allclose(form(rows)[0][:, 3], reflectance, atol=1e-6)
+    assert_allclose(form(rows)[0][:, 3], reflectance, atol=1e-6)
 
 
 NAMES = [("I",), ("Scalar_field_intensity",), ("scalar_Scalar_field_Reflectance",), ("remissions",)]
@@ -99,7 +100,7 @@ def test_reflectance_is_recognised_by_its_usual_names(form, names):
     rows = table(**{"x": "f4", "y": "f4", "z": "f4", "scalar_Time": "f4", **dict.fromkeys(names, "u1")})
     cloud = read_cloud(messages.encode(messages.cloud(rows[None])))
     for points in (form(rows)[0], cloud.points):
-        np.testing.assert_allclose(points[:, 3], rows[names[-1]] / 255, atol=1e-6)
+        assert_allclose(points[:, 3], rows[names[-1]] / 255, atol=1e-6)
 
 
 def test_fields_of_no_numbers_hold_no_bytes(tmp_path):
@@ -107,8 +108,8 @@ def test_fields_of_no_numbers_hold_no_bytes(tmp_path):
     head = {"FIELDS": "x _ y z i i _", "SIZE": "4 1 4 4 2 1 8", "TYPE": "F U F F U U F", "COUNT": "1 0 1 1 0 1 0"}
     for data in ("binary", "ascii", "binary_compressed"):
         points, flaws = read(tmp_path / "scan.pcd", pcd(rows, data, **head))
-        np.testing.assert_allclose(points[:, :3], np.arange(5)[:, None] + [0, 1, 2])
-        np.testing.assert_allclose(points[:, 3], rows["i"] / 255, atol=1e-6)
+        assert_allclose(points[:, :3], np.arange(5)[:, None] + [0, 1, 2])
+        assert_allclose(points[:, 3], rows["i"] / 255, atol=1e-6)
         assert flaws == []
 
 
@@ -172,7 +173,7 @@ def test_the_viewpoint_is_the_pose_whatever_the_frame_of_the_points(tmp_path, in
     frames = list(stream)
     assert [frame.T_world_sensor[0, 3] - origin_m for frame in frames] == pytest.approx([0, 5, 10, 15])
     for frame in frames:
-        np.testing.assert_allclose(frame.points[:, :3], frames[0].points[:, :3], atol=1e-4)
+        assert_allclose(frame.points[:, :3], frames[0].points[:, :3], atol=1e-4)
     assert np.median(np.abs(frames[3].points[:, 0])) < 20
 
 

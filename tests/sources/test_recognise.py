@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from modt.errors import MisuseError, ModtError
 from modt.sources.recognise import open_stream
@@ -33,9 +34,9 @@ def test_each_layout_is_recognised(tmp_path, build, inner, layout, poses, turn_s
     frames = list(stream)
     assert [f.index for f in frames] == list(range(len(frames)))
     assert all((f.T_world_sensor is not None) is poses for f in frames)
-    np.testing.assert_allclose([f.turn_s for f in frames], turn_s, atol=1e-9)
+    assert_allclose([f.turn_s for f in frames], turn_s, atol=1e-9)
     if position is not None:
-        np.testing.assert_allclose(frames[2].T_world_sensor[:3, 3], position, atol=1e-4)
+        assert_allclose(frames[2].T_world_sensor[:3, 3], position, atol=1e-4)
 
 
 EVEN = [0, 0.1, 0.2, 0.3]
@@ -68,8 +69,8 @@ def test_lists_of_times_are_used_as_far_as_they_go(tmp_path, end, edit, stamps_s
     path = drive / "velodyne_points" / f"timestamps{end}.txt"
     path.write_text("\n".join(edit(path.read_text().splitlines())) + "\n")
     stream = open_stream(drive)
-    np.testing.assert_allclose([f.stamp_s for f in stream], stamps_s, atol=1e-9)
-    np.testing.assert_allclose([f.turn_s for f in stream], turns_s, atol=1e-9)
+    assert_allclose([f.stamp_s for f in stream], stamps_s, atol=1e-9)
+    assert_allclose([f.turn_s for f in stream], turns_s, atol=1e-9)
     assert len(stream.info.notes) == len(notes)
     for note, cause in zip(stream.info.notes, notes, strict=True):
         assert re.search(cause, note)
@@ -83,8 +84,8 @@ def test_missing_frames_leave_gaps_and_a_note_and_their_times_may_be_blank(tmp_p
     path.write_text("\n".join([*lines[:2], "", "", lines[4]]))
     stream = open_stream(drive)
     assert [f.index for f in stream] == [0, 1, 4]
-    np.testing.assert_allclose([f.stamp_s for f in stream], [0, 0.1, 0.4], atol=1e-9)
-    np.testing.assert_allclose([f.turn_s for f in stream], 0.1, atol=1e-9)
+    assert_allclose([f.stamp_s for f in stream], [0, 0.1, 0.4], atol=1e-9)
+    assert_allclose([f.turn_s for f in stream], 0.1, atol=1e-9)
     (note,) = stream.info.notes
     assert "2 frames are missing" in note
 
@@ -179,7 +180,7 @@ def test_a_frame_without_a_pose_has_that_of_the_frame_before(tmp_path):
     drive = layouts.raw_drive(tmp_path)
     (drive / "oxts" / "data" / f"{2:010d}.txt").unlink()
     frames = list(open_stream(drive))
-    np.testing.assert_array_equal(frames[2].T_world_sensor, frames[1].T_world_sensor)
+    assert_array_equal(frames[2].T_world_sensor, frames[1].T_world_sensor)
     assert not np.allclose(frames[3].T_world_sensor, frames[2].T_world_sensor)
 
 

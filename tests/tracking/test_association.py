@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import linear_sum_assignment
 
 from modt.classes import ObjectClass
@@ -33,8 +34,8 @@ def test_the_sparse_assignment_is_the_dense_one(n, k, limit, seed):
     i, j = linear_sum_assignment(np.minimum(cost, limit))
     real = cost[i, j] < limit
     rows, columns = assigned(cost, limit)
-    np.testing.assert_array_equal(rows, i[real])
-    np.testing.assert_array_equal(columns, j[real])
+    assert_array_equal(rows, i[real])
+    assert_array_equal(columns, j[real])
 
 
 CAR = ObjectClass.CAR
@@ -151,7 +152,7 @@ def test_the_last_box_is_compared_about_its_centroid_where_the_filter_expects_it
     tracks.box[0, :2] += 3.0
     matches = PaperAssociation().match(tracks, observations)
     assert matches.rows.tolist() == [0]
-    np.testing.assert_allclose(matches.position, observations.centroid)
+    assert_allclose(matches.position, observations.centroid)
 
 
 def test_pairs_above_the_threshold_compete():

@@ -2,6 +2,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from numpy.testing import assert_allclose
 
 from modt.geometry import wrap
 from modt.tracking import kalman
@@ -50,8 +51,8 @@ def test_prediction_is_the_textbooks(x, P, dt_s):
     after, covariance = kalman.predict(x, P, dt_s, acceleration, turn)
     for i in range(3):
         slow_x, slow_P = slow_predict(x[:, i], P[:, :, i], dt_s, acceleration[i], turn[i])
-        np.testing.assert_allclose(after[:, i], slow_x, atol=1e-9)
-        np.testing.assert_allclose(covariance[:, :, i], slow_P, atol=1e-9)
+        assert_allclose(after[:, i], slow_x, atol=1e-9)
+        assert_allclose(covariance[:, :, i], slow_P, atol=1e-9)
 
 
 @given(STATES, POSITIVE, arrays(np.float64, (2, 3), elements=st.floats(-5, 5)))
@@ -60,16 +61,16 @@ def test_update_is_the_textbooks(x, P, z):
     after, covariance = kalman.update(x, P, z, R)
     for i in range(3):
         slow_x, slow_P = slow_update(x[:, i], P[:, :, i], z[:, i], R[:, :, i])
-        np.testing.assert_allclose(np.delete(after[:, i], 2), np.delete(slow_x, 2), atol=1e-8)
+        assert_allclose(np.delete(after[:, i], 2), np.delete(slow_x, 2), atol=1e-8)
         assert abs(wrap(after[2, i] - slow_x[2])) < 1e-8
-        np.testing.assert_allclose(covariance[:, :, i], slow_P, atol=1e-8)
+        assert_allclose(covariance[:, :, i], slow_P, atol=1e-8)
 
 
 @given(STATES, POSITIVE, st.floats(0, 0.5))
 def test_covariances_stay_covariances(x, P, dt_s):
     x, P = kalman.predict(x, P, dt_s, 2.0, 0.3)
     x, P = kalman.update(x, P, x[:2] + 0.1, np.eye(2)[:, :, None].repeat(3, axis=2))
-    np.testing.assert_allclose(P, P.transpose(1, 0, 2), atol=1e-9)
+    assert_allclose(P, P.transpose(1, 0, 2), atol=1e-9)
     assert eigenvalues(P).min() > -1e-9
 
 
@@ -77,14 +78,14 @@ def test_covariances_stay_covariances(x, P, dt_s):
 def test_turning_a_standing_track_moves_nothing(x, P, heading):
     x[3] = 0
     turned, Q = kalman.with_heading(x, P, heading)
-    np.testing.assert_allclose(motion(turned, 0.1), motion(x, 0.1) + (turned - x), atol=1e-12)
-    np.testing.assert_allclose(eigenvalues(Q), eigenvalues(P), atol=1e-9)
-    np.testing.assert_allclose(np.hypot(Q[0, 3], Q[1, 3]), np.hypot(P[0, 3], P[1, 3]))
+    assert_allclose(motion(turned, 0.1), motion(x, 0.1) + (turned - x), atol=1e-12)
+    assert_allclose(eigenvalues(Q), eigenvalues(P), atol=1e-9)
+    assert_allclose(np.hypot(Q[0, 3], Q[1, 3]), np.hypot(P[0, 3], P[1, 3]))
 
 
 @given(STATES, POSITIVE)
 def test_turning_about_keeps_the_motion(x, P):
     turned, Q = kalman.with_forward_speed(x, P)
-    np.testing.assert_allclose(eigenvalues(Q), eigenvalues(P), atol=1e-9)
+    assert_allclose(eigenvalues(Q), eigenvalues(P), atol=1e-9)
     assert (turned[3] >= 0).all()
-    np.testing.assert_allclose(motion(turned, 1.0)[:2], motion(x, 1.0)[:2], atol=1e-12)
+    assert_allclose(motion(turned, 1.0)[:2], motion(x, 1.0)[:2], atol=1e-12)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from modt.classes import ObjectClass
 from modt.config import TrackingConfig
@@ -168,7 +169,7 @@ def test_the_reflectance_is_that_of_the_matched_proposal():
     reflectance = np.arange(10.0).reshape(2, 5)
     frame = frame_at_rest(tracks, [FRONT, REAR], 0)
     after = regrouped(tracks, frame._replace(proposals=replace(frame.proposals, reflectance=reflectance)))
-    np.testing.assert_array_equal(after.proposals.reflectance, reflectance[:1])
+    assert_array_equal(after.proposals.reflectance, reflectance[:1])
 
 
 KNOWN = 6
@@ -194,9 +195,9 @@ def test_a_car_in_two_parts_keeps_its_track_and_its_box(pose):
     for i in range(KNOWN, KNOWN + 8):
         assert follow(follower, [REAR, FRONT], i, pose) == [0, 0]
         assert len(follower.proposals) == 1
-    np.testing.assert_allclose(follower.proposals.box[0, 3:6], WHOLE[3:6], atol=0.05)
+    assert_allclose(follower.proposals.box[0, 3:6], WHOLE[3:6], atol=0.05)
     T = se3(pose(0)[:3, :3], np.zeros(3))  # the world begins at a pose that is far from its origin
-    np.testing.assert_allclose(follower.tracks.box[0], transform_boxes(T, np.array([WHOLE]))[0], atol=0.05)
+    assert_allclose(follower.tracks.box[0], transform_boxes(T, np.array([WHOLE]))[0], atol=0.05)
 
 
 def test_a_car_that_passes_behind_a_pole_keeps_its_velocity():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from modt.geometry.kernels import NUMPY_GEOMETRY
 from modt.tracking.motion_filter import motion_filter_of
@@ -58,7 +59,7 @@ def test_starts_and_stops_are_seen(speed_mps, seed):
     probability, velocity = followed(np.column_stack([along, 0.5 * along]), seed)
     start, stop = 19, 49  # numbers of the first step of the motion, and of the first after it
     assert probability[start + 4] > 0.9
-    np.testing.assert_allclose(velocity[stop - 1], [speed_mps, speed_mps / 2], atol=0.3 + 0.05 * speed_mps)
+    assert_allclose(velocity[stop - 1], [speed_mps, speed_mps / 2], atol=0.3 + 0.05 * speed_mps)
     assert probability[stop + 4] < 0.5
     assert np.hypot(*velocity[stop + 9]) < 0.1
 
@@ -102,5 +103,5 @@ def test_a_stalled_clock_changes_nothing():
         step(subject, tracks, [[1.0, 2.0]])
     before = tracks.copy()
     subject.predict(tracks, 0.0)
-    np.testing.assert_allclose(tracks.velocity, before.velocity, atol=1e-12)
-    np.testing.assert_allclose(tracks.P, before.P, atol=1e-12)
+    assert_allclose(tracks.velocity, before.velocity, atol=1e-12)
+    assert_allclose(tracks.P, before.P, atol=1e-12)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
 
 from modt.classes import ObjectClass
 from modt.geometry.kdop import DIRECTIONS
@@ -64,7 +65,7 @@ def test_a_lost_track_takes_the_part_and_its_former_owner_is_lost():
     tracks = ranked([WHOLE, FRONT], CAR, CAR)
     proposal, matches = reunited(tracks, [FRONT], [1], 40)
     assert proposal == [0, NONE]
-    np.testing.assert_allclose(matches.position[0], tracks.x[0, :2])  # a part measures nothing
+    assert_allclose(matches.position[0], tracks.x[0, :2])  # a part measures nothing
     assert matches.covariance[0, 0, 0] >= 100
 
 
@@ -123,8 +124,8 @@ def test_every_point_stays_in_one_proposal_with_its_coordinates_and_proposals_an
         assert len(np.unique(rows)) == len(rows)
     old = before.members.argsort()
     new = after.members.argsort()
-    np.testing.assert_array_equal(before.members[old], after.members[new])
-    np.testing.assert_array_equal(before.coordinates[:, old], after.coordinates[:, new])
+    assert_array_equal(before.members[old], after.members[new])
+    assert_array_equal(before.coordinates[:, old], after.coordinates[:, new])
 
 
 @given(scenes())
@@ -138,17 +139,17 @@ def test_what_did_not_change_keeps_its_columns_and_boxes_enclose_what_did(scene)
         if members in groups:
             p = groups.index(members)
             for column in ("box", "centroid", "reflectance", "ground_z_m"):
-                np.testing.assert_array_equal(
+                assert_array_equal(
                     getattr(after.proposals, column)[q], getattr(frame.proposals, column)[p], err_msg=column
                 )
         else:
             xyz = after.proposals.coordinates[:, a:b]
-            np.testing.assert_allclose(after.proposals.centroid[q], xyz.mean(axis=1), atol=1e-5)
+            assert_allclose(after.proposals.centroid[q], xyz.mean(axis=1), atol=1e-5)
             height = (after.proposals.box[q, 2] - after.proposals.box[q, 5] / 2, xyz[2].min())
-            np.testing.assert_allclose(*height, atol=1e-5)
+            assert_allclose(*height, atol=1e-5)
             assert after.observations.count[q] == b - a
     whole = ~np.isnan(after.proposals.reflectance[:, 0])
-    np.testing.assert_allclose(after.observations.kdop[:, whole], fresh.kdop[:, whole], atol=1e-5)
+    assert_allclose(after.observations.kdop[:, whole], fresh.kdop[:, whole], atol=1e-5)
 
 
 @given(scenes())
@@ -158,4 +159,4 @@ def test_the_frame_before_is_left_as_it_was(scene):
     before = [column.copy() for column in columns]
     regrouped(tracks, frame)
     for was, column in zip(before, columns, strict=True):
-        np.testing.assert_array_equal(column, was)
+        assert_array_equal(column, was)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from modt.classes import ObjectClass
 from modt.geometry import inverse, transform_boxes
@@ -56,13 +57,13 @@ def test_the_points_of_a_person_are_split_off_a_wall_and_measure_its_position_al
     assert after.proposals.count.tolist() == [WALL_POINTS, PERSON_POINTS]
     assert sorted(after.proposals.members[WALL_POINTS:]) == list(range(PERSON_POINTS))
     assert dict(zip(after.matches.rows.tolist(), after.matches.proposals.tolist(), strict=True)) == {0: 1, 1: 0}
-    np.testing.assert_allclose(after.proposals.box[1], PERSON, atol=0.05)
-    np.testing.assert_allclose(after.proposals.box[0, :6], WALL[:6], atol=0.05)
+    assert_allclose(after.proposals.box[1], PERSON, atol=0.05)
+    assert_allclose(after.proposals.box[0, :6], WALL[:6], atol=0.05)
     order = after.matches.rows.argsort()
-    np.testing.assert_allclose(after.matches.position[order], tracks.x[:, :2], atol=0.05)
+    assert_allclose(after.matches.position[order], tracks.x[:, :2], atol=0.05)
     assert (after.matches.covariance[order, 0, 0] >= [0.001, 100]).all()
     shift = after.matches.position[order][0] - tracks.x[0, :2]
-    np.testing.assert_allclose(after.observations.kdop[:, 1], tracks.predicted_kdops()[:, 0] + DIRECTIONS.T @ shift)
+    assert_allclose(after.observations.kdop[:, 1], tracks.predicted_kdops()[:, 0] + DIRECTIONS.T @ shift)
     assert (after.observations.bottom[1], after.observations.top[1]) == (tracks.bottom[0], tracks.top[0])
 
 
@@ -83,7 +84,7 @@ def test_a_piece_within_a_large_thing_measures_nothing():
     )
     after = split(tracks, around, rows=[1])
     mine = after.matches.rows == 0
-    np.testing.assert_allclose(after.matches.position[mine], tracks.x[:1, :2], atol=0.02)
+    assert_allclose(after.matches.position[mine], tracks.x[:1, :2], atol=0.02)
     assert after.matches.covariance[mine, 0, 0] > 0.05  # where nothing touches it 0.005
 
 
@@ -112,7 +113,7 @@ def test_a_track_that_is_hardly_a_person_keeps_its_proposal():
 def test_the_reflectance_of_a_piece_is_unknown():
     proposals = replace(wall_with(PERSON), reflectance=np.full((1, 5), 0.3))
     after = split(tracks_of_person_and_wall(), proposals, rows=[1])
-    np.testing.assert_array_equal(after.proposals.reflectance, [[0.3] * 5, [np.nan] * 5])
+    assert_array_equal(after.proposals.reflectance, [[0.3] * 5, [np.nan] * 5])
 
 
 @pytest.mark.parametrize(
@@ -223,8 +224,8 @@ def test_a_piece_is_expected_where_the_head_saw_it_not_at_the_middle_of_the_wall
     members = follower.proposals.members[follower.proposals.offsets[1] :]
     assert len(follower.proposals) == 2
     assert np.count_nonzero(members < 80) > 0.95 * 80
-    np.testing.assert_allclose(follower.tracks.x[0, :2], person[:2], atol=0.1)
-    np.testing.assert_allclose(follower.tracks.box[0, :2], person[:2], atol=0.1)
+    assert_allclose(follower.tracks.x[0, :2], person[:2], atol=0.1)
+    assert_allclose(follower.tracks.box[0, :2], person[:2], atol=0.1)
 
 
 def test_the_piece_lies_where_the_filter_expects_its_track():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose
 
 from modt_evaluation.box_tracking import box_tracker
 from modt_evaluation.box_tracking.box_tracker import BoxClass, BoxTracker
@@ -49,7 +50,7 @@ def test_a_rotating_sensor_keeps_its_tracks():
     bearing = np.pi / 4 - 0.1 * np.arange(12)
     r = follow([[car(30 * np.cos(b), 30 * np.sin(b), b)] for b in bearing])
     assert list(r.id) == [0]
-    np.testing.assert_allclose(r.box[0, :2], [30 * np.cos(bearing[-1]), 30 * np.sin(bearing[-1])], atol=0.2)
+    assert_allclose(r.box[0, :2], [30 * np.cos(bearing[-1]), 30 * np.sin(bearing[-1])], atol=0.2)
 
 
 def test_the_yaw_does_not_flip_by_pi():
@@ -103,10 +104,10 @@ def test_prediction_and_update_equal_the_full_kalman_filter(seed):
     H = np.eye(2, 4)
     push = acceleration * np.kron([[dt_s**2 / 2], [dt_s]], np.eye(2))
     K = full @ H.T @ np.linalg.inv(H @ full @ H.T + variance * np.eye(2))
-    np.testing.assert_allclose(moved[0], F @ x[0], atol=1e-9)
-    np.testing.assert_allclose(after[0], x[0] + K @ (z[0] - H @ x[0]), atol=1e-7)
+    assert_allclose(moved[0], F @ x[0], atol=1e-9)
+    assert_allclose(after[0], x[0] + K @ (z[0] - H @ x[0]), atol=1e-7)
     for found, expected in ((grown, F @ full @ F.T + push @ push.T), (squeezed, (np.eye(4) - K @ H) @ full)):
-        np.testing.assert_allclose(found[0], expected[[0, 0, 2], [0, 2, 2]], atol=1e-9)
+        assert_allclose(found[0], expected[[0, 0, 2], [0, 2, 2]], atol=1e-9)
 
 
 def tracked(rows):
@@ -120,9 +121,9 @@ def test_gaps_up_to_the_greatest_are_filled_on_the_line_between_their_ends():
     found = tracked([(0, 1, 0.0, 3.0, 4), (3, 1, 6.0, -3.0, 7), (8, 1, 9.0, -3.0, 7), (4, 2, 1.0, 0.0, 5)])
     filled = bridged(found, 3)
     assert filled[["frame", "id"]].tolist() == [(0, 1), (1, 1), (2, 1), (3, 1), (4, 2), (8, 1)]
-    np.testing.assert_allclose(filled["box"][:4, 0], [0, 2, 4, 6])
-    np.testing.assert_allclose(filled["image_box"][:4, 2], [0, 2, 4, 6])
-    np.testing.assert_allclose(filled["confidence"][:4], [4, 5, 6, 7])
+    assert_allclose(filled["box"][:4, 0], [0, 2, 4, 6])
+    assert_allclose(filled["image_box"][:4, 2], [0, 2, 4, 6])
+    assert_allclose(filled["confidence"][:4], [4, 5, 6, 7])
     assert (np.cos(filled["box"][:4, 6]) < -0.98).all()  # across pi, not through 0
     assert len(bridged(found, 4)) == len(filled) + 4
     assert len(bridged(found, 0)) == len(found)
@@ -141,4 +142,4 @@ def test_overlap_of_volumes():
     a = np.array([[0, 0, 0, 4, 2, 1.5, 0.3]])
     moved = [[0, 0, 0], [0, 0, 0.5], [9, 0, 0], [0, 0, 2.0], [4 * np.cos(0.3) / 2, 4 * np.sin(0.3) / 2, 0]]
     b = np.array([a[0] + [*step, 0, 0, 0, 0] for step in moved])
-    np.testing.assert_allclose(iou_3d(np.repeat(a, len(b), axis=0), b), [1, 1 / 2, 0, 0, 1 / 3], atol=1e-9)
+    assert_allclose(iou_3d(np.repeat(a, len(b), axis=0), b), [1, 1 / 2, 0, 0, 1 / 3], atol=1e-9)

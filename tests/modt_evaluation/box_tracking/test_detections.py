@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from modt.classes import ObjectClass
 from modt.errors import MisuseError
@@ -24,11 +25,11 @@ def one(path):
 def test_both_formats_give_the_same_detections(tmp_path):
     a = one(write(tmp_path, AB3DMOT))
     b = one(write(tmp_path, LABEL))
-    np.testing.assert_allclose(a.box, b.box)
-    np.testing.assert_allclose(a.score, b.score)
-    np.testing.assert_allclose(a.image_box, b.image_box)
+    assert_allclose(a.box, b.box)
+    assert_allclose(a.score, b.score)
+    assert_allclose(a.image_box, b.image_box)
     assert a.object_class[0] == b.object_class[0] == ObjectClass.CAR
-    np.testing.assert_allclose(a.box[0, :6], [13.53, 4.57, 1.96 / 2 - 1.84, 4.75, 1.81, 1.96])
+    assert_allclose(a.box[0, :6], [13.53, 4.57, 1.96 / 2 - 1.84, 4.75, 1.81, 1.96])
 
 
 def test_frames_without_detections_are_kept_and_other_types_ignored(tmp_path):

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from modt.pipeline import STAGES
 from modt_profiling.comparison.comparison import COUNTS
@@ -102,7 +103,7 @@ def test_sweeps_of_different_sizes_tell_the_constant_of_segmentation():
     for each in streams:
         for mode in each.runs.values():
             mode.cost[:, STAGES.index("segmentation")] += 2e-3
-    np.testing.assert_allclose(Rates.fit(streams).segmentation, [2e-3, SEG_S], rtol=0.05)
+    assert_allclose(Rates.fit(streams).segmentation, [2e-3, SEG_S], rtol=0.05)
     assert Rates.fit(streams[:1]).segmentation[0] == 0.0
 
 
@@ -110,7 +111,7 @@ def test_another_stream_is_predicted(prediction):
     truth = measured(TEST)
     assert truth[GAMMA].min() > 2.5
     for found in (prediction, predicted(CALIBRATION[:1])):
-        np.testing.assert_allclose(found.expected.values, truth, rtol=0.12)
+        assert_allclose(found.expected.values, truth, rtol=0.12)
         assert covers(found, truth).all()
 
 
@@ -172,5 +173,5 @@ def test_counts_and_costs_are_of_the_repetition_of_median_cost():
     passes = [(run.counts + k, slower * run.cost) for k, slower in enumerate([9.0, 0.5, 1.1])]
     made = [SimpleNamespace(counts=lambda n=n: n, cpu_s=lambda s=s: s) for n, s in passes]
     middle = RunCosts.median(made)
-    np.testing.assert_array_equal(middle.counts, passes[2][0])
-    np.testing.assert_array_equal(middle.cost, passes[2][1])
+    assert_array_equal(middle.counts, passes[2][0])
+    assert_array_equal(middle.cost, passes[2][1])

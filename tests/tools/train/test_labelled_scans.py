@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from modt.classes import ObjectClass
 from modt.config import SensorConfig
@@ -26,8 +27,8 @@ def test_argoverse_sweeps_are_in_the_sensor_frame(tmp_path):
     (scan,) = argoverse_scans(tmp_path)
     assert scan.kinds == (ObjectClass.CAR, ObjectClass.BACKGROUND)
     assert scan.drive == "argoverse2/log"
-    np.testing.assert_allclose(scan.points[1, :3], [10.0, 0.0, -1.07], atol=1e-5)
-    np.testing.assert_allclose(scan.boxes[0, :3], [10.15, 0.5, -1.92], atol=1e-5)
+    assert_allclose(scan.points[1, :3], [10.0, 0.0, -1.07], atol=1e-5)
+    assert_allclose(scan.boxes[0, :3], [10.15, 0.5, -1.92], atol=1e-5)
     assert len(scan.objects[0]) == 30
 
 
@@ -48,7 +49,7 @@ def test_pandaset_scans_are_in_the_sensor_frame_and_types_between_the_classes_un
     scan = pandaset(tmp_path, "000001", points, rows)
     assert scan.sensor == "pandar64"
     assert scan.kinds == (ObjectClass.PEDESTRIAN, ObjectClass.CYCLIST, ObjectClass.BACKGROUND)
-    np.testing.assert_allclose(scan.boxes[:, :3], [[10, 0, -2.2], [30, 0, -2.15], [40, 0, -1.85]], atol=1e-6)
+    assert_allclose(scan.boxes[:, :3], [[10, 0, -2.2], [30, 0, -2.15], [40, 0, -1.85]], atol=1e-6)
     assert [len(own) for own in scan.objects] == [25, 25, 25]
     assert np.flatnonzero(scan.unlabelled).tolist() == list(range(25, 50))
 
@@ -61,7 +62,7 @@ def test_cars_of_pandaset_are_turned_to_their_points_and_people_without_a_label_
     people = np.array([[-20.0, 51.6, 1.6], [-21.3, 51.4, 1.6], [-20.0, 55.0, 1.6]])
     rows = "".join(f"Car,{x},30,1.2,4.4,1.8,1.5,0,41\n" for x in (-20, -10))
     scan = pandaset(tmp_path, "world-000040", np.concatenate([across, along, people]), rows)
-    np.testing.assert_allclose(scan.boxes[:, 6], [np.pi / 2, 0.0])
+    assert_allclose(scan.boxes[:, 6], [np.pi / 2, 0.0])
     assert [len(own) for own in scan.objects] == [41, 41]
     assert np.flatnonzero(scan.unlabelled).tolist() == [82, 83]
 
@@ -129,6 +130,6 @@ def test_objects_of_a_label_file_stand_where_it_states(tmp_path):
     )
     _, truth = label_scene(path, seed=0).sweep(0)
     assert [k.name for k in truth.kinds] == ["Car", "Pedestrian", "Cyclist"]
-    np.testing.assert_allclose(truth.boxes[0, [0, 1, 3, 4, 5]], [15.27, -2.0, 4.0, 1.6, 1.5], atol=0.1)
-    np.testing.assert_allclose(truth.boxes[1, :2], [9.27, 3.0], atol=0.1)
+    assert_allclose(truth.boxes[0, [0, 1, 3, 4, 5]], [15.27, -2.0, 4.0, 1.6, 1.5], atol=0.1)
+    assert_allclose(truth.boxes[1, :2], [9.27, 3.0], atol=0.1)
     assert (truth.points > 50).all()

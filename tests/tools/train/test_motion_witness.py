@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from tools.study.drives import simulated
 from tools.train.motion_witness import CELLS, FRAGMENTS, MOST, WEIGHT, counted, log_likelihood_ratio
@@ -11,8 +12,8 @@ def test_ratio_of_frequent_cells_is_that_of_the_counts():
     counts = np.full((4, CELLS, 4), 100_000)
     counts[:, 0, 2] *= 3
     ratio = log_likelihood_ratio(counts)
-    np.testing.assert_allclose(ratio[:, 1, 0], WEIGHT * np.log(3 / (CELLS + 2) * CELLS), atol=1e-3)
-    np.testing.assert_allclose(ratio[:, 0], 0.0, atol=1e-3)
+    assert_allclose(ratio[:, 1, 0], WEIGHT * np.log(3 / (CELLS + 2) * CELLS), atol=1e-3)
+    assert_allclose(ratio[:, 0], 0.0, atol=1e-3)
 
 
 def test_an_object_that_is_hardly_ever_so_short_is_none_there():
@@ -20,7 +21,7 @@ def test_an_object_that_is_hardly_ever_so_short_is_none_there():
     counts[FRAGMENTS, :, 2] = 0
     ratio = log_likelihood_ratio(counts)
     assert (ratio[FRAGMENTS, 1] == -MOST).all()
-    np.testing.assert_allclose(ratio[FRAGMENTS, 0], 0.0, atol=1e-3)
+    assert_allclose(ratio[FRAGMENTS, 0], 0.0, atol=1e-3)
 
 
 @pytest.mark.slow
