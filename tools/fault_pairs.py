@@ -43,7 +43,7 @@ POSES = "poses"
 """Faults of the poses are not reported where what stands still is not in view, as under another fault."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Change:
     """A fault: what it does to the points of a sweep, or to the pose, and the time until it is reported [s]."""
 
@@ -113,7 +113,7 @@ CHANGES = (
 )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Episode:
     """A fault from one frame up to another one.
 

@@ -57,7 +57,7 @@ JITTER = 1e-3
 """Noise of the ranges while the robot waits for the run to start, as a share; without it the sweeps would repeat."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class OtherFault(Change):
     """A fault that the sweeps do not show: of the network, or a signal to the process. It has to be counted."""
 

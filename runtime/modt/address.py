@@ -10,7 +10,7 @@ from urllib.parse import parse_qsl, urlsplit
 from modt.errors import MisuseError, install
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Address:
     """A parsed address.
 
@@ -40,7 +40,7 @@ class Address:
         return value
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Scheme:
     """Form and opener of the addresses of a scheme.
 

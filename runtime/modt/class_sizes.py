@@ -35,7 +35,7 @@ WHOLE_SIZE_M: Float64 = np.where(IS_VEHICLE[:, None], USUAL_CAR_M, MAX_SIZE_M)
 """(4, 2) length and width that parts joined into an object of each class do not exceed."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class PersonSize:
     """Exclusive bounds on the size of a possible person. They depend on what is measured and what an error costs."""
 

@@ -48,7 +48,7 @@ class ClassKind(Enum):
     """A vehicle with a person on it, never part of a larger object. It moves like a cyclist."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class ClassSpec:
     """One class.
 

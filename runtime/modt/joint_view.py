@@ -25,7 +25,7 @@ from modt.sensor_fit.levelling import Leveller
 from modt.types import Float32, Float64, Frame, FrameResult, Proposals
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class SensorPart:
     """One sensor of a robot: its mount and range, and what levels and segments its sweeps."""
 

@@ -71,7 +71,7 @@ def open(path: str | PathLike[str], *, profile: profile.Names = None, **capture:
     return open_stream(Path(path), capture=capture)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class TrackedObjects:
     """The tracks alive after a frame, n rows.
 

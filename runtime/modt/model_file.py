@@ -15,7 +15,7 @@ MAX_BYTES = 64 << 20
 REMEDY = "use a model of modt, or of modt train"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ModelFile:
     """A model as it was read from its file.
 

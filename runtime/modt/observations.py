@@ -18,7 +18,7 @@ MIN_RANGE_M = 1e-3
 """Distance from the sensor within which a proposal lies in no direction [m]."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Observations:
     """The proposals of a frame in the world, P rows.
 
@@ -105,7 +105,7 @@ def observe(proposals: Proposals, T_world_sensor: Float64, kernels: GeometryKern
     )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class StaticTracks:
     """The tracks after a frame, as the odometry needs them, M rows in the order of their ids.
 
@@ -126,7 +126,7 @@ class StaticTracks:
     predicted_kdop: Float64
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Located:
     """A frame in the world.
 

@@ -138,7 +138,7 @@ class FusionStage(Protocol):
         """Write the views (R, C) of the rows (R,) and their posteriors; returns (R,) whether each is confirmed."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Pipeline:
     """The stages in their order; a mode of the method is a choice of these parts."""
 

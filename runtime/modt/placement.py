@@ -11,7 +11,7 @@ from modt.geometry import Camera, inverse, rotation_zyx, se3, yaw_of
 from modt.types import Float32, Float64, Frame
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Mount:
     """Rotation of the sensor on its robot.
 
@@ -86,7 +86,7 @@ def joined_points(sweeps: Sequence[Frame | None], T_common: Sequence[Float64]) -
     return np.concatenate([*moved, np.zeros((0, 4), np.float32)])
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class PlanarMotion:
     """Steady motion of the sensor in the ground plane.
 
@@ -152,7 +152,7 @@ def delays(centroid: Float64, box: Float64, turn_s: float, mid_rad: float = 0.0)
     return np.asarray(bearing * (-turn_s / (2 * np.pi)))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Placement:
     """Pose and motion of the sensor in a sweep.
 

@@ -41,7 +41,7 @@ class _Loader(yaml.SafeLoader):
         return super().compose_node(parent, index)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Layer:
     """One profile as written.
 
@@ -169,7 +169,7 @@ def _entries(
         yield key, value, at
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Resolved:
     """Profiles, combined.
 

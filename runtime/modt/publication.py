@@ -29,7 +29,7 @@ def kinds(result: FrameResult) -> Int:
     return kind
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class PublishedObjects:
     """The published tracks of a frame, n rows, in the level frame at the place of the sensor."""
 

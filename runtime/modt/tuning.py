@@ -15,7 +15,7 @@ from modt.segmentation.tuning import SegmentationTuning
 from modt.tracking.tuning import TrackingTuning
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class MethodTuning:
     """Chosen values of all stages, and of the comparison of k-DOPs that they share."""
 

@@ -45,7 +45,7 @@ MOMENTS = (0.25, 0.75)
 """Part of an undisturbed batch within which a worker is killed, or the batch is stopped."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Recording:
     """A simulated drive to be written into a folder."""
 

@@ -41,7 +41,7 @@ RANGES_M = (2.7, 80.0)
 """Nearest and farthest range of Patchwork++'s defaults [m]."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class LabelledScan:
     """A scan with a class a point.
 
@@ -71,7 +71,7 @@ class LabelledScan:
         return ground, counted & ~ground
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Score:
     """Precision, recall and F1 of one kind of points [%]."""
 

@@ -110,7 +110,7 @@ class World:
         return Discovery((Candidate("soak", (Meter(facts, read),)),))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Fault:
     """One kind of fault.
 

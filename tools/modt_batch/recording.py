@@ -42,7 +42,7 @@ BESIDE_BYTES = 1 << 20
 """Greatest size of a file beside a recording that is copied with it, as a calibration [bytes]."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Task:
     """A recording to be replayed in a mode.
 

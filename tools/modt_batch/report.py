@@ -20,7 +20,7 @@ MODELLED = "Energy is assumed power times CPU time: this tests the counting, not
 WORST = "worst: the fewest trusted frames first, then the longest frames"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Figure:
     """A column of the table of runs, as it is shown."""
 

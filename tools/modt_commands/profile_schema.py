@@ -13,7 +13,7 @@ from modt.config import MountedSensor, ProfileConfig, StageConfig
 from modt.profile import EXTENDS, SENSORS
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Key:
     """One key of a profile.
 

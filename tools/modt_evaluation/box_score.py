@@ -25,7 +25,7 @@ RECALLS = np.arange(1, 41) / 40
 """Recalls over which precision is averaged, as KITTI."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class BoxScore:
     """Boxes and velocities of one class; means over the reported objects that stand for a labelled one."""
 

@@ -16,7 +16,7 @@ BINS = 15
 CURVE_RECALLS = np.arange(1, 21) / 20
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ClassScore:
     """Proposals of one class."""
 

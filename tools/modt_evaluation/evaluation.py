@@ -21,7 +21,7 @@ from modt_evaluation.track_score import TrackScore, track_metrics, track_scores
 from modt_evaluation.truth import LABELLED, Role
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class SegmentationScore:
     """Counts of one kind of object, one for each object and frame; merged to missed in the order of `Outcome`."""
 
@@ -53,7 +53,7 @@ RANGES_M = {ALL: (0.0, float("inf")), "0-20": (0.0, 20.0), "20-40": (20.0, 40.0)
 """Bands of range by name."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class DriveRows:
     """Judged rows of one drive: tables of its objects, proposals and reported objects, and associations by class."""
 
@@ -67,7 +67,7 @@ class DriveRows:
     associations: tuple[tuple[Association, ...], ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class RangeScore:
     """Scores of what lies within a band of range, by class (segmentation: by labelled type, too)."""
 
@@ -75,7 +75,7 @@ class RangeScore:
     classification: dict[str, ClassScore]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Evaluation:
     """Scores of some drives; tracks and metrics are empty and None where labels have no identities."""
 

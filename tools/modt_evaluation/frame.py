@@ -12,7 +12,7 @@ from modt.types import NONE, Float32, Float64, FrameResult, Int, Self
 from modt_evaluation.truth import FrameTruth
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class JudgedFrame:
     """Results and truth of a frame of N points and M visible tracks."""
 

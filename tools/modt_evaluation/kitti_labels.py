@@ -23,7 +23,7 @@ MAX_NUMBER = 1e5
 """Greatest number that a label states, of either sign."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Label:
     """An object in a frame."""
 

@@ -117,7 +117,7 @@ def submission(results: Results, task: str) -> dict[str, Any]:
     return {"meta": META, "results": rows}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class NuscenesScore:
     """Score of a class as nuScenes' detection benchmark has it; errors are 1 below the least recall."""
 
@@ -132,7 +132,7 @@ class NuscenesScore:
 ERRORS = ("translation_m", "scale", "orientation_rad", "velocity_mps")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Boxes:
     """Boxes of one class: sample, centre, size, yaw, velocity and score of each."""
 

@@ -19,7 +19,7 @@ FOOT_M = 0.25
 """Least distance of these points above its foot [m]."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ObjectPoints:
     """Indices of the points of each of n labelled objects: clear of the ground, and all in its box."""
 
@@ -45,7 +45,7 @@ class ObjectPoints:
         return found
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Overlap:
     """Points that n objects and P proposals of a frame share. The last proposal is empty and stands for none."""
 

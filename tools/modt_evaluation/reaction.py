@@ -18,7 +18,7 @@ LAST_FRAMES = 15
 """Objects that come this close to the end of a drive are left out."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Reaction:
     """Frames from the first in which an object has MIN_POINTS within MAX_RANGE_M until it is reported as its class.
 

@@ -106,7 +106,7 @@ def ratio(part: float, whole: float) -> float | None:
     return part / whole if whole else None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Association:
     """Identities of (n,) objects and (k,) tracks of one class in a frame, and the (n, k) similarity of each pair."""
 

@@ -8,7 +8,7 @@ IGNORABLE = ("cut", "few", "parked", "dontcare")
 """Objects cut by the view or of few points; proposals on parked cars outside their labels or in DontCare regions."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Rules:
     """Thresholds of a judgement.
 

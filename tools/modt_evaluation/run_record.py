@@ -92,7 +92,7 @@ Proposed = Callable[[dict[str, Any], Float32], Int]
 """(N,) proposal of each point, NONE where it belongs to none, by the record of a frame and its (N, 4) points."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class RunRecord:
     """The directory of a run."""
 

@@ -20,7 +20,7 @@ MIN_FRAMES_FOLLOWED = 3
 """A track that follows each of several objects for this many frames or more is a mis-association."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Length:
     """Mean number of frames for which a track follows an object (N_go), beside that of faultless tracking."""
 
@@ -37,7 +37,7 @@ def _length(objects: int, frames: int, followed: int, discontinuities: int) -> L
     return Length(objects, frames, length, ideal, ratio(length or 0.0, ideal or 0.0))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class TrackScore:
     """Scores of the tracks of one kind of objects over all frames.
 

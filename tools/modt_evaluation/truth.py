@@ -57,7 +57,7 @@ LARGE = "Medium-sized Truck", "Semi-truck", "Bus", "Towed Object", "Other Vehicl
 PANDASET_TYPES: Types = {**dict.fromkeys(LARGE, (ObjectClass.CAR, Role.NEUTRAL)), **LABELLED_TYPES}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Regions:
     """Image regions in which nothing is labelled (KITTI's DontCare)."""
 
@@ -73,7 +73,7 @@ class Regions:
         return np.asarray(within.any(axis=0) & (uvw[:, 2] > 1))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class FrameTruth:
     """The n objects of one frame; boxes are upright in a frame of their own, the sensor's by default."""
 
@@ -99,7 +99,7 @@ class FrameTruth:
         return cls(np.asarray(id_, np.int64), tuple(type_), table[:, 0], table[:, 1], boxes, **more)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Truth:
     """The labels of a recording."""
 

@@ -59,7 +59,7 @@ class Sighting(NamedTuple):
     reported: str  # class
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Mover:
     """A track that moves like a road user and has no label, over n frames."""
 

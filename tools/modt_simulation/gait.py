@@ -21,7 +21,7 @@ BOB_M_PER_RAD = 0.4
 """Amplitude of the height over that of roll and pitch [m/rad]; the height swings twice in a period of the pitch."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Gait:
     """A steady gait.
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from modt.classes import CLASSES, ObjectClass
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Kind:
     """A kind of body."""
 

@@ -10,7 +10,7 @@ from modt.errors import MisuseError
 from modt.types import Self
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Condition:
     """A condition by its name, its numbers and the time at which it begins."""
 

@@ -26,7 +26,7 @@ CHUNK_RAYS = 16_384
 """Rays of a batch, which fit the cache."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class RangeImage:
     """First hits of the rays of a sweep."""
 
@@ -34,7 +34,7 @@ class RangeImage:
     solid: Int32  # (B, A) index of the solid hit, NO_SOLID for the ground or the sky
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Windows:
     """Bounds of each solid in the range image. A solid across the seam has two windows."""
 
@@ -49,7 +49,7 @@ class Windows:
         return np.asarray(np.diff(self.rows, axis=1)[:, 0] * np.diff(self.columns, axis=1)[:, 0])
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Shape:
     """Kinds of surfaces that bound a solid, and their intersection with rays."""
 

@@ -40,7 +40,7 @@ def sector_delay_s(part: int, period_s: float) -> float:
     return (float(share > 0.5) - share) * period_s
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Sector:
     """Neighbouring columns of a sensor that are measured at one time."""
 
@@ -65,7 +65,7 @@ class Sector:
         return sectors
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Surfaces:
     """First hits of the rays of a sweep, or of a sector of it."""
 
@@ -89,7 +89,7 @@ class Surfaces:
         )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Returns:
     """Returns of a receiver for the rays of a sweep."""
 
@@ -199,7 +199,7 @@ class Receiver:
         measured[row, front] += np.float32(self.sensor.edge_delay_m) * delay
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Truth:
     """Ground truth of a sweep."""
 

@@ -18,7 +18,7 @@ EYE: Float32 = np.eye(3, dtype=np.float32)
 NO_CUTS: Float32 = np.tile(np.array([0, 0, 0, 1], np.float32), (1, N_CUTS, 1))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Solids:
     """n convex solids: each the intersection of a box, half-spaces and a quadric.
 

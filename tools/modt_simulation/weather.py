@@ -28,7 +28,7 @@ OVERLAP_M = (0.6, 2.0)
 """Ranges at which the beam enters the view of the receiver, and is in it wholly [m]; nearer echoes are weak."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class View:
     """The rays of a sweep.
 
@@ -48,7 +48,7 @@ class View:
     time_s: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Echoes:
     """The strongest echo from the air on each ray.
 
@@ -78,7 +78,7 @@ class Air(Protocol):
         """Echoes from the air in front of the surfaces of a view."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Particles:
     """Drops or flakes with diameters D [mm], of which there are n0 exp(-slope D) a cubic metre and millimetre.
 
@@ -158,7 +158,7 @@ def snow(rate_mm_h: float) -> Particles:
     return Particles(2500.0 * rate_mm_h**-0.94, 2.29 * rate_mm_h**-0.45, 2.15, brightness=0.009, most_m=15.0)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Fog:
     """Fog as a soft target, by Rasshofer et al. (2011) and, for its backscatter, Hahner et al. (2021).
 
@@ -197,7 +197,7 @@ class Fog:
         return _echoes(range_m, signal[np.arange(len(best)), best], view, most_intensity=0.05)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Dust:
     """Clouds of dust or exhaust that form beside the robot, drift with the wind and thin out.
 

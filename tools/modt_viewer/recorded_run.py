@@ -29,7 +29,7 @@ from modt_profiling.energy.run_energy import run_energy
 from modt_profiling.reporting.records import read_ledger, read_windows
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class RecordedRun:
     """The records of a run, read.
 

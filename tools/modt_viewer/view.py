@@ -94,7 +94,7 @@ FILM_WIDTH = 960
 """Width of a film [pixel]."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class View:
     """The frames to show and the file to write."""
 

@@ -10,7 +10,7 @@ Timed = tuple[float, bytes]
 """Time at which a payload is sent [s], and the payload."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class PacketFaults:
     """Shares of the packets that are lost, sent twice, sent after the next one, or followed by random bytes."""
 

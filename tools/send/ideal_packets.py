@@ -21,7 +21,7 @@ HOUR_US = 3_600_000_000
 DAY_US = 86_400_000_000
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Layout:
     """Layout of the firings in a Velodyne's packets.
 

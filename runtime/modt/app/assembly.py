@@ -57,7 +57,7 @@ from modt.types import UNLIMITED, Budget, Float32, Proposals
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Mode:
     """One way of the method over the same stages.
 
@@ -102,7 +102,7 @@ MODES = {
 """Fig. 2a, and the sections on efficient (Table I) and accurate detection (Table II)."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class BlindSectorFilter:
     """Moves the points of blind sectors to the origin, which means no return, before it segments."""
 

@@ -37,7 +37,7 @@ _SANE_YEAR = 2024
 """An earlier year means that the clock has lost its battery."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Finding:
     """The outcome of a check: ok, warn (works, less well) or fail (does not work)."""
 

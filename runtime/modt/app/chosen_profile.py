@@ -25,7 +25,7 @@ GIVEN = "given"
 """Name of a configuration that a program has given."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ChosenProfile:
     """The profile of a stream.
 

@@ -23,7 +23,7 @@ _BITS = 5
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class DeadlineFigures:
     """Figures of the deadlines for status and summary. Times have their mean, p50, p99 and max."""
 

@@ -31,7 +31,7 @@ NONE = "none"
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Request:
     """Request of a user. Each field is an option of `modt replay`."""
 

@@ -30,7 +30,7 @@ STALE_S = 5.0
 """Greatest age of the status of a running service [s]."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class FrameCounts:
     """Frames and tracks since the start."""
 
@@ -44,7 +44,7 @@ class FrameCounts:
     left_out: Mapping[str, float]  # mean number of points of a frame without a proposal, by kind
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class LoopStatus(DeadlineFigures):
     """Deadlines, failures by kind, and reloads of the profile."""
 
@@ -53,7 +53,7 @@ class LoopStatus(DeadlineFigures):
     refused_reloads: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class PowerStatus:
     """Power and energy by the last window of the meters, unknown before the first one and while a meter fails."""
 
@@ -79,7 +79,7 @@ class PowerStatus:
         )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class HostStatus:
     """The process on its machine."""
 
@@ -88,7 +88,7 @@ class HostStatus:
     lacking: Sequence[str]  # permissions that were refused
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Status:
     """The document modt.status/1."""
 

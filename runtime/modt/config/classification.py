@@ -10,7 +10,7 @@ BATCH = 8
 """Proposals of one network call: few enough for their features to stay in the cache."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class ClassificationConfig(StageConfig):
     """The network and its input (section V-A)."""
 
@@ -37,7 +37,7 @@ class ClassificationConfig(StageConfig):
         return 1 if self.likelihood == "pooled" else self.max_points
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class SchedulerConfig(StageConfig):
     """Budget of classification. Null means no limit, and the limit that is reached first applies."""
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from modt.config.fields import StageConfig, number
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class EnergyConfig(StageConfig):
     """Power of the board where no meter is read, and the coefficients that `modt-profile calibrate` finds.
 

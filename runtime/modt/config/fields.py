@@ -58,7 +58,7 @@ def completed(declared: Field[Any], value: Any) -> Any:
     return (*value, *own) if complete else value
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class StageConfig:
     """Base of every stage's configuration: checks each value against its declared bounds.
 

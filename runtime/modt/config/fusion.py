@@ -8,7 +8,7 @@ from modt.classes import CLASSES
 from modt.config.fields import StageConfig, choice, number, per_class
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class FusionConfig(StageConfig):
     """Fusion of views, boxes and motion to a class, and its confirmation (section V-C, Figs. 10 and 11)."""
 
@@ -33,7 +33,7 @@ class FusionConfig(StageConfig):
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class DecisionConfig(StageConfig):
     """The reported class of a track."""
 

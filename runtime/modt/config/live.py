@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from modt.config.fields import StageConfig, choice, number
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class LoopConfig(StageConfig):
     """Limit of the live loop, in effect with `modt run`."""
 
@@ -20,7 +20,7 @@ class LoopConfig(StageConfig):
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class TrustConfig(StageConfig):
     """Results while modt is blind, that is while what it reports does not follow from what is around."""
 
@@ -32,7 +32,7 @@ class TrustConfig(StageConfig):
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class RecordingConfig(StageConfig):
     """Records of the live loop, in effect with `modt run`."""
 

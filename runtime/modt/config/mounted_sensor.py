@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from modt.types import Float64
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class MountedSensor(StageConfig):
     """One of several sensors of a robot, whose frame has x forward, y left, z up, and its origin on the ground."""
 

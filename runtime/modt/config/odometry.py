@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from modt.config.fields import StageConfig, number
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class OdometryConfig(StageConfig):
     """Poses from another program, in effect with `--odometry udp://`, `unix://` and `ros2://`."""
 

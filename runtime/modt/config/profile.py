@@ -21,7 +21,7 @@ MAX_CELLS = 5e7
 """Greatest number of cells of both grids (200 MB)."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class ProfileConfig:
     """The whole configuration: a sensor, a board and all stages, as profiles describe them.
 

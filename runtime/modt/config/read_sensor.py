@@ -8,7 +8,7 @@ from modt.config.mounted_sensor import MountedSensor
 from modt.config.profile import ProfileConfig
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class ReadSensor(MountedSensor):
     """One of several sensors of a robot, with its profile as it was read together with that of the robot."""
 

@@ -12,7 +12,7 @@ KERNELS = ("auto", NATIVE, NUMPY)
 """Names of the code for points."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class SegmentationConfig(StageConfig):
     """Ground, clusters, and the sizes that an object can have (section III-A)."""
 

@@ -19,7 +19,7 @@ REFLECTANCE_SCALES = ("hdl-64e", "pandar64")
 """Sensors whose reflectance a model may have learnt."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class SensorConfig(StageConfig):
     """Mount, range and resolution of the sensor."""
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from modt.config.fields import StageConfig, choice, number
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class TrackingConfig(StageConfig):
     """Association of proposals with tracks, and the end of a track."""
 

@@ -44,7 +44,7 @@ class StageWork:
         self.cpu_ns += other.cpu_ns
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class LedgerLine:
     """The costs of a frame, a line modt.ledger/1 of ledger.jsonl. Its fields are the keys of the line."""
 

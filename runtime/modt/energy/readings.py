@@ -18,7 +18,7 @@ TICK_S = 0.01
 """Greatest time between two steps of a counter [s]."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class History:
     """State of a meter by which its next reading is judged."""
 
@@ -32,7 +32,7 @@ class History:
     high_W: float = -math.inf  # highest power measured
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class _Step:
     """Change between two readings: its energy, bounds of its power, and its fault."""
 

@@ -14,7 +14,7 @@ from modt.energy.readings import History, judge
 SCHEMA = "modt.energy/1"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class MeterEnergy:
     """Energy of a window by one of its meters [J], None where it is not measured."""
 
@@ -24,7 +24,7 @@ class MeterEnergy:
     J: float | None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class EnergyWindow:
     """Energy and work of a window, a line modt.energy/1 of ledger.jsonl. Its fields are the keys of the line."""
 
@@ -61,7 +61,7 @@ class EnergyWindow:
         return None if self.energy_J is None or not self.n_frames else self.energy_J / self.n_frames
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Clocks:
     """The clocks of a machine."""
 

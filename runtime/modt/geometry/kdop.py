@@ -77,7 +77,7 @@ class PairWeights(NamedTuple):
     points: float  # difference of the logarithms of their numbers
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Shapes:
     """n k-DOPs with what is compared of them."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ShapeTuning:
     """Comparison of k-DOPs. The kernels hold it, for every stage that compares some."""
 

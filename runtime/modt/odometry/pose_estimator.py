@@ -188,7 +188,7 @@ class PoseEstimator:
         return sweep.place(_rigid(correction @ placement.T_world_sensor))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class _Sweep:
     """A sweep that is placed by a pose on trial.
 

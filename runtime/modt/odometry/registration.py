@@ -19,7 +19,7 @@ from modt.odometry.tuning import LandmarkTuning, RegistrationTuning
 from modt.types import Bool, Float64, Int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Landmarks:
     """Stationary objects that observations are matched against; n rows.
 
@@ -113,7 +113,7 @@ pairs, and the third one checks it. A fit may have fewer pairs than candidates: 
 both their landmark and their observation count."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Fit:
     """A motion and its support.
 
@@ -137,7 +137,7 @@ def _best(*fits: Fit | None) -> Fit | None:
     return max((fit for fit in fits if fit is not None), key=lambda fit: fit.inliers, default=None)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class _View:
     """Landmarks, and the observations that are to be brought onto them.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class LandmarkTuning:
     """Mean k-DOPs of landmarks, which are stationary tracks."""
 
@@ -24,7 +24,7 @@ class LandmarkTuning:
     Chosen on: twelve simulated drives, by the error of the heading at their ends."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class RegistrationTuning:
     """Fit of a pose to landmarks."""
 
@@ -76,7 +76,7 @@ class RegistrationTuning:
     Chosen on: judgement; six simulated robots that spin at 180 degrees/s from the first sweep on."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class PoseCheckTuning:
     """Given poses against the landmarks."""
 
@@ -128,7 +128,7 @@ class PoseCheckTuning:
     Chosen on: good again within 5 s."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class OdometryTuning:
     """Everything that is chosen in the odometry.
 

@@ -44,7 +44,7 @@ ENOUGH_BYTES = 4 << 20
 """Value of rmem_max that suffices for a sweep of 120,000 points in Ethernet fragments [bytes]."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Message:
     """A message as received, and the time of sending by the sender's clock [s]."""
 

@@ -25,7 +25,7 @@ UNKNOWN = f"{8 * (36 + 6 + 36)}x"
 """Zeros for the covariance of the pose, and for the twist with its covariance."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class OdometryMessage:
     """A pose of the robot.
 
@@ -83,7 +83,7 @@ FIXED_M = 1e-3
 """Greatest change of the elements of a transform that counts as fixed."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Transform:
     """Pose of a frame in its parent at a time; names have no leading slash."""
 

@@ -44,7 +44,7 @@ def reflectance_name(names: Iterable[str]) -> str | None:
     return next((plain[name] for name in REFLECTANCES if name in plain), None)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class PointCloud:
     """A message of points as received.
 
@@ -70,7 +70,7 @@ class PointCloud:
     delay_s: Float32 | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Table:
     """Records of points, and what was corrected to read them."""
 
@@ -272,7 +272,7 @@ AHEAD_RAD = 0.2
 """A sweep whose middle lies within this angle of straight ahead is stamped there [rad]."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Turn:
     """A turn of a head: turn_s, mid_rad as in Frame, times of its first point and of mid_rad by the points' clock.
 

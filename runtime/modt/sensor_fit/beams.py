@@ -109,7 +109,7 @@ FULL_QUANTILE = 0.75
 snow and dust fill them in part."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class BeamPattern:
     """Beams of a sensor, or the mean spacing of its returns where it has no beams.
 
@@ -147,7 +147,7 @@ def find_beams(sweeps: Sequence[Float32], origins_m: Float64 = ORIGINS_M) -> Bea
     return BeamPattern(elevations_deg, spacing_deg, step_deg, rings.contrast)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class _Rings:
     bins: Int  # (N,) bin of each point, by its best origin
     peaks: Int  # (B,) bins of the beams

@@ -36,7 +36,7 @@ MAX_BELOW_SHARE = 0.15
 """Greatest number of points below a floor over that of the points on it."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class FloorSlope:
     """The floor z = -depth_m - slope . (x, y), and its change with the time from the stamp.
 

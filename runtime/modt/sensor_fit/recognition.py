@@ -44,7 +44,7 @@ MAX_HEIGHT_SHARE = 0.2
 """Greatest difference as a share of the height; the greater of both limits counts."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Recognition:
     """Differences between a profile and a sweep.
 

@@ -16,7 +16,7 @@ OTHER = "other"
 """Scale that models do not know."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Scale:
     """Reflectances that a sensor reports in streets.
 

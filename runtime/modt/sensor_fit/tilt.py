@@ -44,7 +44,7 @@ UPSIDE_DOWN = np.diag([1.0, -1.0, -1.0])
 LEVEL_UP = np.array([0.0, 0.0, 1.0])
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Floor:
     """A floor below the sensor.
 

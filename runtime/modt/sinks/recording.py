@@ -70,7 +70,7 @@ class AtOnce(Writer[Job]):
         return {"dropped": 0}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class RecordingHealth:
     """Counts of a recording, for status and summary."""
 
@@ -84,7 +84,7 @@ class RecordingHealth:
     failing: str | None  # why nothing can be written now
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class LineJob:
     """Job that appends a line to a file of a recording."""
 

@@ -23,7 +23,7 @@ OBJECTS = {
 """Name, type and encoder of the objects for each value of the option `messages`."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Topic:
     """A topic, the type of its messages, and the function that encodes a frame."""
 
@@ -32,7 +32,7 @@ class Topic:
     encode: Callable[[FrameResult], bytes]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class TopicOptions:
     """Choice of the topics that are published.
 

@@ -57,7 +57,7 @@ class Stored(NamedTuple):
     flaw: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class BagTopic:
     """A topic of a recording: type of its messages as PACKAGE/NAME, their number, and their encoding."""
 

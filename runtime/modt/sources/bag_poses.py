@@ -30,7 +30,7 @@ CONTINUOUS = "odom"
 """Last part of the name of the frame in which poses never jump (REP 105)."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class PoseTopic:
     """A topic of poses.
 

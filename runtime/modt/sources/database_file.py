@@ -39,7 +39,7 @@ TABLES = "SELECT name FROM sqlite_master WHERE type != 'index' AND (type != 'tab
 """Names of what is no plain table; views and triggers are programs."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Listing:
     """Contents of a database.
 

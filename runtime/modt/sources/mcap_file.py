@@ -46,7 +46,7 @@ _BEGIN = re.compile(rb"[\x05\x06](?=.{4}\0{4})", re.DOTALL)
 """Possible begin of a message or of a chunk below 4 GiB."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Piece:
     """Records that are read together: those in a chunk, or a message outside of one.
 

@@ -135,7 +135,7 @@ PERIOD_S = 0.1
 """Time between scans that have no stamps [s]."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ScanReference:
     """A scan on disk."""
 

@@ -15,7 +15,7 @@ from modt.types import COMPENSATED, DESKEWED, NO_TURN, Float32, Frame, Self
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class StreamInfo:
     """Properties of a stream known before its first frame."""
 
@@ -34,7 +34,7 @@ class StreamInfo:
     began_s: float = 0.0  # time of stamp 0 on the clock of the recording [s]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Fault:
     """An unusable scan, or unusable points of one."""
 
@@ -138,7 +138,7 @@ class Stream(Protocol):
         """Stream of the frames with first <= index < last."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Received:
     """A frame, and the time at which its sweep was complete and checked, on the clock of the stream [s]."""
 
@@ -150,7 +150,7 @@ class StreamEndedError(Exception):
     """The source has no more sweeps."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Sweep:
     """One turn of a sensor.
 

@@ -33,7 +33,7 @@ MAX_PHASE = 2.5 * np.pi
 CLOCKWISE = 1.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Arc:
     """Bearings that a message covers, counter-clockwise from `low_rad` on [rad]."""
 

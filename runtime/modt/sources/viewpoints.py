@@ -20,7 +20,7 @@ SAME_M = 1e-3
 """Poses that differ by less are the same: the place of the sensor on its carrier [m]."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Viewpoints:
     """Sensor positions by the headers of a folder.
 

@@ -30,7 +30,7 @@ THIRDS = 3
 SIDES = ("ahead", "to the left", "behind", "to the right")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Loss:
     """Returns that are missing: whether too many, and a phrase for them."""
 

@@ -36,7 +36,7 @@ UNSCALED_FAVOUR = 0.02
 """Share of the points by which a scale has to be better for each of its steps, as places are several steps wide."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Change:
     """How the scene changed at once: turned by so many bearings, then mirrored, and scaled by so many steps."""
 

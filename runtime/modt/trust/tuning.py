@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ReturnsTuning:
     """Returns by sector and by beam against the usual ones."""
 
@@ -50,7 +50,7 @@ class ReturnsTuning:
     Chosen on: simulated drives."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class LastingTuning:
     """Single beams and narrow sectors over a window of time."""
 
@@ -112,7 +112,7 @@ class LastingTuning:
     Chosen on: a mean over 3 s."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class GroundTuning:
     """Steps of the ground."""
 
@@ -129,7 +129,7 @@ class GroundTuning:
     Chosen on: simulated ramps and hills, and real drives."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class MountTuning:
     """Tilt of the ground of the last looks against that of the first ones."""
 
@@ -147,7 +147,7 @@ class MountTuning:
     Chosen on: simulated drives over hills, ramps and stairs."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class SceneTuning:
     """Obstacles against those of the sweep before, brought by the pose into the present one."""
 
@@ -182,7 +182,7 @@ class SceneTuning:
     Chosen on: simulated aisles."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class VisibilityTuning:
     """Visibility by the share of rays that end in the air."""
 
@@ -203,7 +203,7 @@ class VisibilityTuning:
     Chosen on: half of it is about the range at which people are reported."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class TrustTuning:
     """Everything that is chosen in the trust."""
 

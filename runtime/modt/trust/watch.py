@@ -25,7 +25,7 @@ REPAIR = "have the sensor repaired; things at that height are seen from nearer o
 UNCOVER = "uncover the sensor, or state the sector in sensor.blind_sectors_deg if the robot hides it"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Finding:
     """Objection of a check to the sweeps at a look."""
 

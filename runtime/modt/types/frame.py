@@ -13,7 +13,7 @@ NO_TURN = "their points' times are of no turning head"
 in whose middle the stamp is."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Frame:
     """One full sweep.
 

@@ -40,7 +40,7 @@ LEFT_OUT: tuple[PointKind, ...] = tuple(kind for kind in PointKind if kind not i
 """Kinds of the points that belong to no proposal."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Proposals:
     """The segments of one frame that could be objects.
 

@@ -13,7 +13,7 @@ from modt.types.tracks import Tracks
 from modt.types.trust import TRUSTED, Trust
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class FrameResult:
     """Result of a frame."""
 

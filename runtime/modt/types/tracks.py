@@ -118,7 +118,7 @@ class Tracks(ObjectBoxes, Decisions, Requests, Evidence, Motion):
     """All columns side by side, in the order of the parts from right to left."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class TrackedFrame:
     """Result of tracking: the tracks by owner, of which each stage writes its own part, and the frame's proposals."""
 

@@ -15,7 +15,7 @@ class TrustLevel(IntEnum):
     BLIND = 2  # what is reported does not follow from what is around
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Reason:
     """A cause for less than good trust.
 
@@ -33,7 +33,7 @@ class Reason:
     since_s: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Trust:
     """Whether what is reported can be believed, since when [s], and the reasons against it."""
 

@@ -68,7 +68,7 @@ def group_of(kind: Int8) -> Int:
     return by_kind.take(-kind)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Cells:
     """The occupied cells of a sweep, each once for every height and group of its points.
 

@@ -72,7 +72,7 @@ AGE_BONUS = 0.5
 """Increase of the confidence per unit of the logarithm of the number of detections."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class BoxClass:
     """Parameters that differ between classes. Confidences are on the scale of PointRCNN's scores."""
 
@@ -91,7 +91,7 @@ BOX_CLASSES = {
 """Tuned on PointRCNN's detections on KITTI."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class BoxTracks:
     """Reported tracks of a frame."""
 

@@ -37,7 +37,7 @@ T_LEVEL_CAMERA = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 
 """Camera axes to the level frame: x forward, y left, z up, origin in the camera."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Detections:
     """The D detections of a sequence, ordered by frame."""
 

@@ -38,7 +38,7 @@ RANGES_M = (10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0)
 RANGE = "range of interest [m]"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Experiment:
     """Replays of a drive, and the figures that follow from them.
 

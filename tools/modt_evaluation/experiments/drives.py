@@ -43,7 +43,7 @@ SIMULATED_TYPES = {**KITTI_TYPES, TRUCK.name: (KITTI_TYPES["Car"][0], Role.NEUTR
 _NO_LABELS = frozenset({"velodyne_points", "velodyne", "oxts", "image_00", "image_01", "image_02", "image_03"})
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class KittiDrive:
     """A raw drive with tracklets, or a label file of KITTI tracking.
 
@@ -90,7 +90,7 @@ class KittiDrive:
                 yield frame, truth.frames[frame.index]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class SimulatedDrive:
     """A drive through a synthetic scene, labelled all round."""
 

@@ -31,7 +31,7 @@ RECALLS = np.arange(1, 20) / 20
 """Recalls at which a curve is given."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Estimate:
     """A figure, its 95 % interval (None where fewer than two things are resampled), and how many these are."""
 
@@ -58,7 +58,7 @@ def ratio(part: ArrayLike, whole: ArrayLike) -> Estimate:
     return Estimate(value, low, high, n)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Ranking:
     """Proposals by decreasing score, down to the last correct one.
 
@@ -145,7 +145,7 @@ def _weights(n: int) -> Float64:
 OBJECTS = CLASS_NAMES[1:]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Figure:
     """A figure of an experiment.
 
@@ -184,7 +184,7 @@ def curves(judged: Judged, at: float | None = None) -> Iterator[Figure]:
             yield Figure(recall, f"precision {name}", Estimate(precision))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ObjectLengths:
     """(n,) frames in which each labelled object is to be followed and is followed, and its discontinuities."""
 
@@ -221,7 +221,7 @@ def track_lengths(judged: Judged, at: float | None) -> Iterator[Figure]:
     yield Figure(at, "ideal N_go", ratio(found.wanted, once))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class TrackWork:
     """(n,) frames with a proposal of each track, whether most are on objects, and its calls of the network."""
 

@@ -25,7 +25,7 @@ CALL = np.dtype([("drive", int), ("track", int)])
 """One row for each classification."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Judged:
     """Tables of one drive or of several."""
 
@@ -53,7 +53,7 @@ class Judged:
         return replace(self, objects=self.objects[self.objects["range_m"] <= range_m])
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class LabelReplay:
     """Ideal detector and tracker: every labelled object is detected and followed by itself."""
 
@@ -68,7 +68,7 @@ class LabelReplay:
         return Judged(frames, np.concatenate(rows), np.zeros(0, PROPOSAL), np.zeros(0, CALL))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class NetworkReplay:
     """Segmentation and network as the detector, without a budget of CPU time, whose effect depends on the machine.
 

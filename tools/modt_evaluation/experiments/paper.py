@@ -47,7 +47,7 @@ def figure(experiment: str, streams: str, variant: str, at: float | None, quanti
     return None if found is None else (found, ALL_DRIVES)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Mark:
     """Statements of the paper about a figure, whose curve is an image there and known at few places.
 

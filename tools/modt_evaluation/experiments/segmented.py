@@ -47,7 +47,7 @@ from modt_evaluation.rules import Rules
 from modt_evaluation.truth import FrameTruth
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class SegmentedFrame:
     """A sweep with its proposals, their likelihoods, labels, and the points of objects."""
 

@@ -22,7 +22,7 @@ Profiles = tuple[str, ...]
 Task = tuple[Drive, Replay]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Row:
     """A figure of some streams, and the paper's figure.
 
@@ -55,7 +55,7 @@ class Row:
     paper_over: str | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Study:
     """Some experiments on some drives.
 

@@ -27,7 +27,7 @@ _COUNTING = "Energy is assumed power times CPU time: the reconciliation tests co
 _PHYSICS = "Energy is the meter's: the reconciliation is with the meter as a whole."
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Basis:
     """The conversion of CPU time to energy."""
 

@@ -23,7 +23,7 @@ _LOAD = [COUNTS.index(name) for name in ("calls", "classified", "points")]
 Interval = tuple[float, float]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class RunCosts:
     """Counts and costs of one mode on F frames."""
 
@@ -48,7 +48,7 @@ class RunCosts:
         return RunCosts(self.counts[frames], self.cost[frames])
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class GammaEstimate:
     """Gamma of one mode over tracking-by-detection, with intervals at 95 % over frames resampled in blocks."""
 

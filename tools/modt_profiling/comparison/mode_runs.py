@@ -28,7 +28,7 @@ _LOADS = (0, 1, 2, 4, 8, 16, 32, 64, 128, None, None)
 """Calls of a frame, None for all. Unit costs fitted to few calls alone would not hold for many."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Comparison:
     """Parameters of a comparison."""
 

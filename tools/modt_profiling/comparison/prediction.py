@@ -35,7 +35,7 @@ _START = 8
 """Frames at the start of a stream in which all that is there is new."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Stream:
     """A stream on which the modes did run."""
 
@@ -47,7 +47,7 @@ class Stream:
         return Stream({name: run.take(frames) for name, run in self.runs.items()}, self.observed[frames])
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Views:
     """Selection of the proposals that a mode classifies."""
 
@@ -74,7 +74,7 @@ class Views:
         return cls(each / max(float(asking.mean()), 1e-9), relative, -np.log1p(-frames_with_calls) / each)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Rates:
     """Cost of each unit of work [CPU s], and the selection of each mode.
 
@@ -114,7 +114,7 @@ class Rates:
         )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Expected:
     """Expectation for one stream."""
 
@@ -153,7 +153,7 @@ def expect(rates: Rates, observed: Int, frames: int) -> Expected:
     return Expected(cost, EnergyModel(e_seg, e_class, n, n / tracks if tracks else 1.0))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Forecast:
     """A prediction with its interval at 95 %; arrays as Expected.values."""
 

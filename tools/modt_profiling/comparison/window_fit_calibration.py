@@ -29,7 +29,7 @@ _BURSTS = 5
 """Bursts of each stage; the median counts."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Calibration:
     """Result of a calibration."""
 
@@ -49,7 +49,7 @@ class Calibration:
         }
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Workload:
     """The work that a calibration varies."""
 

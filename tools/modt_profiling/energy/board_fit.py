@@ -41,7 +41,7 @@ _TAILS = (0.025, 0.975)
 """Quantiles of the intervals at 95 %."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Regressor:
     """One count of a window: an entry of a stage, or of the whole window where the stage is empty."""
 
@@ -63,7 +63,7 @@ POINT = Regressor("point_J", CLASSIFICATION, "points")
 REGRESSORS = (IDLE, SEG, CLASS, POINT)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Coefficient:
     """A fitted value with its interval at 95 %."""
 
@@ -73,7 +73,7 @@ class Coefficient:
     high: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Fit:
     """Result of a fit."""
 

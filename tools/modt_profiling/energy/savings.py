@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class EnergyModel:
     """Equations 2 and 3 by their four parameters; the others, neutral by default, are costs that they leave out.
 
@@ -66,7 +66,7 @@ class EnergyModel:
         return self.n_go / self.gamma - 1.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Counts:
     """The work of one run."""
 
@@ -103,7 +103,7 @@ class Counts:
         return self.classified / self.proposals if self.proposals else 1.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class UnitCosts:
     """Energy of units of work, all in joules or all in CPU seconds."""
 
@@ -122,7 +122,7 @@ class UnitCosts:
         return self.classification(counts) / counts.classified if counts.classified else 0.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class OtherCosts:
     """Mean energy a frame of the stages that Equation 2 leaves out, in the unit of UnitCosts."""
 
@@ -130,7 +130,7 @@ class OtherCosts:
     schedule: float  # scheduling and fusion
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class GammaTerm:
     """One reason why gamma is not N_go: its change of gamma, and gamma after it and all terms before it."""
 
@@ -139,7 +139,7 @@ class GammaTerm:
     gamma: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Reconciliation:
     """Gamma of a pair of runs, from their own counts and costs.
 

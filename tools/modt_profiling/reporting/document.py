@@ -16,7 +16,7 @@ if TYPE_CHECKING:  # Matplotlib is an extra
     from matplotlib.axes import Axes
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Link:
     """Text that leads to another file on a page."""
 
@@ -42,7 +42,7 @@ CHART_IN = (3.6, 2.3)
 """Width and height of a chart [inch]; a page stretches it to the width that it has."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Table:
     """Rows of cells under a head, whose first cell is the title."""
 
@@ -50,7 +50,7 @@ class Table:
     rows: Sequence[Sequence[Cell]]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Plot:
     """A drawing on axes of its own, with a title and a note."""
 
@@ -60,7 +60,7 @@ class Plot:
     size_in: tuple[float, float] = CHART_IN
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Section:
     """Part of a page; its contents stand in this order."""
 
@@ -73,7 +73,7 @@ class Section:
     preformatted: str = ""  # text whose lines and columns stay as they are
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Page:
     """Contents of a page."""
 
@@ -82,7 +82,7 @@ class Page:
     sections: Sequence[Section]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Document:
     """A report."""
 

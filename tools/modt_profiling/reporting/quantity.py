@@ -13,7 +13,7 @@ _MARKS = {Kind.MEASURED: "", Kind.INTEGRATED: "i:", Kind.ESTIMATED: "~"}
 LEGEND = "~ estimated; i: integrated power; no mark: read or counted. In brackets: 95 % intervals."
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Quantity:
     """One number of a report."""
 

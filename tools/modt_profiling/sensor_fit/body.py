@@ -24,7 +24,7 @@ JOIN_DEG = 6.0  # sectors nearer than this are one
 MIN_SWEEPS = 5
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Body:
     """Visible parts of the robot."""
 

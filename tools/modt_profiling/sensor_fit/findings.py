@@ -20,7 +20,7 @@ RELIABLE_CONTRAST = 0.985
 """Least share of the points in the peaks of beams that are told apart without a doubt."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Recording:
     """Some sweeps of a sensor.
 
@@ -33,7 +33,7 @@ class Recording:
     stamps_s: Sequence[float]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Finding:
     """A value of a profile's key."""
 

@@ -106,7 +106,7 @@ def _rapl(zone: Path, name: str, scope: Scope) -> Meter:
     return file_meter(facts, zone / "energy_uj")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Board:
     """A board whose power rails are known, recognised by the model in its device tree and the labels of its rails.
 
@@ -304,7 +304,7 @@ FINDERS = (find_powercap, find_hwmon, find_batteries)
 """Functions that search sysfs, mounted at a path, for candidates of one type of meter."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Discovery:
     """The meters of a machine: usable ones, the best first, then the others with the reason."""
 

@@ -49,7 +49,7 @@ class MeterLostError(Exception):
     """A meter cannot be read now."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Facts:
     """Static properties of a meter."""
 
@@ -77,7 +77,7 @@ class Facts:
         return self.scope not in (Scope.PROCESS, Scope.RAIL)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Meter:
     """One sensor or counter."""
 
@@ -122,7 +122,7 @@ def number_or_none(path: Path) -> float | None:
     return None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Candidate:
     """Meters whose readings may be summed, since their scopes do not overlap, usable or not."""
 
@@ -169,7 +169,7 @@ def model_name(board: EnergyConfig) -> str:
     return f"model {board.idle_W:g} W idle, {board.busy_W:g} W busy"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Conditions:
     """Clock policy, frequency and temperature of a core, as sysfs shows them."""
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from modt.sources.packets.packet_decoder import PacketDecoder
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Driver:
     """Sensors of a maker.
 

@@ -57,7 +57,7 @@ class Signature(NamedTuple):
     identity: int | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Model:
     """A model of sensor.
 

@@ -47,7 +47,7 @@ LATE_S = 1.0
 """Greatest age of a sweep or packet that is used [s]."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Arrival:
     """A sweep as the receiving thread hands it over: its flaws, whether it can be used, and when it came [s]."""
 

@@ -60,7 +60,7 @@ def _flaw(numbers: tuple[int, ...] | None, at: int, found: int | None, *, sound:
     return f"{cause} at byte {at}" if found else f"{cause} from byte {at} on"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Datagram:
     """A UDP datagram.
 

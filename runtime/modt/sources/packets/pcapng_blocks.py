@@ -37,7 +37,7 @@ class Captured(NamedTuple):
     frame: bytes
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Interface:
     """Type of the link, unit of the stamps [s], and seconds to add to them."""
 

@@ -32,7 +32,7 @@ SAME_S = 0.5e-6
 """Packets whose times differ by less are the same packet [s]."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Entry:
     """A packet of a turn.
 
