@@ -20,7 +20,7 @@ class DeadlineError(BaseException):
     """An input took too long; no reader catches it."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Finding:
     """An exception that should not have left a reader; findings of one place are one."""
 

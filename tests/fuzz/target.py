@@ -11,7 +11,7 @@ Feed = tuple[Sequence[bytes], Callable[[bytes], object]]
 """Valid inputs, and a call that reads one."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Target:
     """A reader, and the errors by which it may refuse an input."""
 

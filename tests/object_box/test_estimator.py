@@ -71,6 +71,9 @@ class Scene:
         self.estimator.estimate(self.own, self.motion, self.decisions, proposals, Placement(np.eye(4)))
         return self.own.whole_box.copy()
 
+    def show_car(self):
+        return self.show([visible_points(CAR)], [CAR[6]])
+
     def hide(self, step):
         """A frame without proposals, in which the tracks move on by a step."""
         self.motion.proposal[:] = NONE
@@ -91,23 +94,26 @@ def an_estimator(request, monkeypatch):
     return whole_boxes_of(chosen_kernels(request.param))
 
 
+@pytest.fixture(name="scene")
+def a_scene_of_one_car(estimator):
+    return Scene(estimator, [ObjectClass.CAR])
+
+
 def angle(a, b, period=np.pi):
     """Difference of two headings that are alike after a period."""
     return abs((a - b + period / 2) % period - period / 2)
 
 
-def test_a_car_seen_at_a_corner_is_found_whole(estimator):
-    scene = Scene(estimator, [ObjectClass.CAR])
+def test_a_car_seen_at_a_corner_is_found_whole(scene):
     for _ in range(20):
-        (box,) = scene.show([visible_points(CAR)], [CAR[6]])
+        (box,) = scene.show_car()
     assert_allclose(box[:2], CAR[:2], atol=0.1)
     assert_allclose(box[3:6], CAR[3:6], atol=0.15)
     assert angle(box[6], CAR[6]) < 0.02
     assert not scene.own.heading_known[0]
 
 
-def test_a_car_of_which_the_rear_is_seen_reaches_away_from_the_sensor(estimator):
-    scene = Scene(estimator, [ObjectClass.CAR])
+def test_a_car_of_which_the_rear_is_seen_reaches_away_from_the_sensor(scene):
     for _ in range(20):
         (box,) = scene.show([visible_points(REAR, ["near"])], [np.pi / 2])
     assert angle(box[6], REAR[6]) < 0.02
@@ -126,8 +132,7 @@ def test_what_moves_heads_where_it_goes(estimator):
     assert angle(boxes[0, 6], CAR[6] - np.pi, 2 * np.pi) < 0.2  # a car that reverses, as far as one can tell
 
 
-def test_a_parked_car_does_not_jump_by_a_quarter_turn(estimator):
-    scene = Scene(estimator, [ObjectClass.CAR])
+def test_a_parked_car_does_not_jump_by_a_quarter_turn(scene):
     rng = np.random.default_rng(1)
     whole = visible_points(CAR)
     near = visible_points(CAR, ["near"])
@@ -159,19 +164,17 @@ def test_a_car_seen_in_part_stands_as_one_in_line_with_it(estimator, ahead_m, be
     assert (angle(boxes[0, 6], CAR[6]) < 0.1) == in_line
 
 
-def test_a_box_that_was_turned_wrongly_turns_once_the_long_side_is_seen(estimator):
-    scene = Scene(estimator, [ObjectClass.CAR])
+def test_a_box_that_was_turned_wrongly_turns_once_the_long_side_is_seen(scene):
     (first,) = scene.show([middle_of_the_flank(CAR)], [CAR[6]])
     for _ in range(10):
-        (box,) = scene.show([visible_points(CAR)], [CAR[6]])
+        (box,) = scene.show_car()
     assert angle(first[6], CAR[6] + np.pi / 2) < 0.1  # headings are tried at every 5 degrees
     assert angle(box[6], CAR[6]) < 0.05
     assert_allclose(box[3:5], CAR[3:5], atol=0.3)
 
 
-def test_the_box_of_a_hidden_track_moves_on_with_it(estimator):
-    scene = Scene(estimator, [ObjectClass.CAR])
-    (seen,) = scene.show([visible_points(CAR)], [CAR[6]])
+def test_the_box_of_a_hidden_track_moves_on_with_it(scene):
+    (seen,) = scene.show_car()
     (hidden,) = scene.hide([1.0, -0.5])
     assert_allclose(hidden[:2] - seen[:2], [1.0, -0.5])
     assert_array_equal(hidden[2:], seen[2:])
@@ -179,7 +182,7 @@ def test_the_box_of_a_hidden_track_moves_on_with_it(estimator):
 
 def test_background_has_the_box_last_seen(estimator):
     scene = Scene(estimator, [ObjectClass.BACKGROUND])
-    (box,) = scene.show([visible_points(CAR)], [CAR[6]])
+    (box,) = scene.show_car()
     assert_array_equal(box, scene.motion.box[0])
 
 
@@ -200,10 +203,9 @@ def test_the_box_stands_on_the_ground(estimator):
     assert box[5] == pytest.approx(1.7, abs=0.1)
 
 
-def test_merged_objects_leave_the_size_as_it_was(estimator):
-    scene = Scene(estimator, [ObjectClass.CAR])
+def test_merged_objects_leave_the_size_as_it_was(scene):
     for _ in range(10):
-        (before,) = scene.show([visible_points(CAR)], [CAR[6]])
+        (before,) = scene.show_car()
     merged = CAR.copy()
     merged[3:5] = 9.0, 4.0
     (box,) = scene.show([visible_points(merged)], [CAR[6]])
@@ -243,7 +245,7 @@ def test_compiled_boxes_are_those_of_numpy_to_the_byte(monkeypatch):
 
 def test_the_paper_s_tracks_have_the_boxes_seen():
     scene = Scene(SeenBoxes(), [ObjectClass.CAR])
-    (box,) = scene.show([visible_points(CAR)], [CAR[6]])
+    (box,) = scene.show_car()
     assert_array_equal(box, scene.motion.box[0])
 
 

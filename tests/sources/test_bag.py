@@ -32,18 +32,27 @@ def x_of(frames):
     return [frame.T_world_sensor[0, 3] for frame in frames]
 
 
+def stamps_of(frames):
+    return [frame.stamp_s for frame in frames]
+
+
+def tenths(n, first=0):
+    """Numbers a tenth apart, of some stamps or of the way of the robot."""
+    return pytest.approx(first + np.arange(n) / 10, abs=1e-5)
+
+
 def test_sweeps_are_frames_and_stamps_count_from_the_first(opened):
     stream = opened(by_time(clouds(), poses()))
     assert (stream.info.name, stream.info.layout, stream.info.n_frames) == ("drive", "rosbag2", 4)
     assert stream.info.period_s == pytest.approx(0.1, abs=1e-6)
     frames = list(stream)
     assert [frame.index for frame in frames] == [0, 1, 2, 3]
-    assert [frame.stamp_s for frame in frames] == pytest.approx([0.0, 0.1, 0.2, 0.3], abs=1e-6)
+    assert stamps_of(frames) == tenths(4)
     for k, frame in enumerate(frames):
         expected = messages.xyzi(20 + k).view(np.float32).reshape(-1, 4)
         assert_array_equal(frame.points, expected)
     assert stream.info.has_poses  # interpolated at the stamps of the sweeps
-    assert x_of(frames) == pytest.approx([10.0, 10.1, 10.2, 10.3], abs=1e-6)
+    assert x_of(frames) == tenths(4, 10)
 
 
 def test_the_mount_of_the_sensor_is_taken_from_the_static_transforms(opened):
@@ -106,7 +115,7 @@ def test_a_driver_without_stamps_is_stamped_by_the_recording(opened):
     raw = messages.encode(messages.cloud(messages.xyzi(20), stamp_s=0.0))
     recorded = [("/points", CLOUD, BEGAN_S + k / 10, raw) for k in range(3)]
     stream = opened(recorded)
-    assert [frame.stamp_s for frame in stream] == pytest.approx([0.0, 0.1, 0.2], abs=1e-6)
+    assert stamps_of(stream) == tenths(3)
 
 
 @pytest.mark.parametrize("unit_s", [0.0, 1e-3, 1e3])
@@ -116,14 +125,14 @@ def test_stamps_that_stand_still_are_replaced_by_the_times_of_the_recording(open
         cloud = messages.cloud(messages.xyzi(20), stamp_s=1000.0 + k / 10 * unit_s)
         recorded.append(("/points", CLOUD, BEGAN_S + k / 10, messages.encode(cloud)))
     stream = opened(recorded)
-    assert [frame.stamp_s for frame in stream] == pytest.approx([k / 10 for k in range(6)], abs=1e-6)
+    assert stamps_of(stream) == tenths(6)
     assert "the stamps of the sweeps stand still" in stream.info.notes[0]
 
 
 def test_a_sweep_that_is_recorded_twice_is_read_once(opened):
     twice = by_time(clouds(6), [(topic, kind, s + 1e-3, data) for topic, kind, s, data in clouds(6)])
     stream = opened(twice)
-    assert [frame.stamp_s for frame in stream] == pytest.approx([k / 10 for k in range(6)], abs=1e-6)
+    assert stamps_of(stream) == tenths(6)
     assert stream.faults.left_out == {"has the stamp of the last sweep: recorded twice?": 6}
 
 
@@ -139,7 +148,7 @@ def test_one_of_two_sensors_in_a_topic_is_read_and_the_other_counted(write, tmp_
     path = write(tmp_path / "drive", recorded)
     stream = open_stream(path, capture={} if asked is None else {"frame": asked})
     frames = list(stream)
-    assert [frame.stamp_s for frame in frames] == pytest.approx([k / 10 for k in range(6)], abs=1e-6)
+    assert stamps_of(frames) == tenths(6)
     assert stream.reading.frame_id == (asked or "front")
     other = "front" if asked else "rear"
     assert stream.faults.left_out == {f"messages are of another sensor, in the frame {other}": 6}
@@ -163,13 +172,13 @@ def test_a_lying_stamp_of_a_pose_costs_no_other_pose(opened, lying):
         message = messages.odometry(lying(k, true_s), [10.0 + true_s - BEGAN_S, 0.0, 0.0], UP, "lidar")
         recorded.append((topic, kind, recorded_s, messages.encode(message)))
     frames = list(opened(by_time(clouds(), recorded)))
-    assert x_of(frames) == pytest.approx([10.0, 10.1, 10.2, 10.3], abs=1e-5)
+    assert x_of(frames) == tenths(4, 10)
 
 
 def test_poses_that_a_localisation_gives_seconds_later_are_those_of_their_stamps(opened):
     late = [(topic, kind, recorded_s + 1.5, data) for topic, kind, recorded_s, data in poses()]
     stream = opened(by_time(clouds(), late))
-    assert x_of(stream) == pytest.approx([10.0, 10.1, 10.2, 10.3], abs=1e-5)
+    assert x_of(stream) == tenths(4, 10)
     assert stream.reading.without_pose == 0
 
 
@@ -188,13 +197,13 @@ def test_what_is_recorded_after_the_clock_was_set_back_comes_later(tmp_path, opt
     path = tmp_path / "drive"
     path = write_rosbag2(path, recorded) if options is None else write_mcap(path, recorded, **options)
     stream = open_stream(path, capture={"odometry": "odom"})
-    assert [frame.stamp_s for frame in stream] == pytest.approx([k / 10 for k in range(12)], abs=1e-6)
+    assert stamps_of(stream) == tenths(12)
     assert not stream.faults.count
 
 
 def test_topics_that_a_converter_wrote_one_after_the_other_are_merged(opened):
     stream = opened([*clouds(), *poses()])
-    assert x_of(stream) == pytest.approx([10.0, 10.1, 10.2, 10.3], abs=1e-5)
+    assert x_of(stream) == tenths(4, 10)
 
 
 def test_a_wrong_stamp_of_the_first_sweep_costs_it_alone(opened):
@@ -202,7 +211,7 @@ def test_a_wrong_stamp_of_the_first_sweep_costs_it_alone(opened):
     recorded = by_time([(*clouds()[0][:3], late)], clouds()[1:], poses())
     frames = list(opened(recorded))
     assert [frame.index for frame in frames] == [1, 2, 3]
-    assert x_of(frames) == pytest.approx([10.1, 10.2, 10.3], abs=1e-5)
+    assert x_of(frames) == tenths(3, 10.1)
 
 
 def test_the_cause_of_unusable_clouds_is_named(write, tmp_path):
@@ -325,7 +334,7 @@ def static(topic):
 def test_poses_come_from_any_namespace_and_from_transforms(opened, others):
     stream = opened(by_time(clouds(), others))
     assert stream.info.has_poses
-    assert x_of(stream) == pytest.approx([11.0, 11.1, 11.2, 11.3], abs=1e-5)
+    assert x_of(stream) == tenths(4, 11)
 
 
 @pytest.mark.parametrize(
@@ -336,7 +345,7 @@ def test_the_frame_of_the_points_may_lack_the_namespace_of_the_transforms(opened
     mount = [("/tf_static", TF, BEGAN_S - 1, messages.encode(messages.transforms(*edges)))]
     stream = opened(by_time(clouds(), poses("base_link"), mount))
     assert stream.info.has_poses == posed
-    assert not posed or x_of(stream) == pytest.approx([11.0, 11.1, 11.2, 11.3], abs=1e-5)
+    assert not posed or x_of(stream) == tenths(4, 11)
 
 
 @pytest.mark.parametrize("package", ["livox_ros_driver2", "livox_ros_driver"])
@@ -370,7 +379,7 @@ def test_single_poses_are_used_if_they_are_asked_for(write, tmp_path, kind, moun
         unasked.info.pose_notes
     )
     stream = open_stream(path, capture={"odometry": "/pose"})
-    assert x_of(stream) == pytest.approx([x, x + 0.1, x + 0.2, x + 0.3], abs=1e-5)
+    assert x_of(stream) == tenths(4, x)
     named = kind == "TransformStamped"
     assert named == (not stream.info.pose_notes)
 
@@ -380,7 +389,7 @@ def test_an_option_chooses_one_of_several_topics_of_poses(write, tmp_path):
     path = write(tmp_path / "drive", recorded)
     assert "--capture odometry=" in " ".join(open_stream(path).info.pose_notes)
     stream = open_stream(path, capture={"odometry": "wheels"})
-    assert x_of(stream) == pytest.approx([10.0, 10.1, 10.2, 10.3], abs=1e-5)
+    assert x_of(stream) == tenths(4, 10)
     assert stream.reading.poses == "/wheels"
     with pytest.raises(MisuseError, match=r"/gps: no poses in this topic; .*/odom, /wheels"):
         open_stream(path, capture={"odometry": "gps"})

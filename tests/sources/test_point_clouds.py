@@ -22,6 +22,10 @@ WRITERS = {
     for data in kinds
 }
 
+XYZ = dict.fromkeys("xyz", "f4")
+"""Columns of coordinates, and their values in a table that begins with them."""
+XYZ_OF_TABLE = np.arange(5)[:, None] + [0, 1, 2]
+
 
 def read(path, raw):
     path.write_bytes(raw)
@@ -61,10 +65,10 @@ end_header
 
 
 def test_a_pcd_of_padded_memory_is_read(tmp_path):
-    rows = table(x="f4", y="f4", z="f4", gap="u4", intensity="f4", ring="u2", rest="u4")
+    rows = table(**XYZ, gap="u4", intensity="f4", ring="u2", rest="u4")
     head = {"FIELDS": "x y z _ intensity ring _", "SIZE": "4 4 4 1 4 2 1", "TYPE": "F F F U F U U"}
     points, _ = read(tmp_path / "scan.pcd", pcd(rows, **head, COUNT="1 1 1 4 1 1 4"))
-    assert_allclose(points[:, :3], np.arange(5)[:, None] + [0, 1, 2])
+    assert_allclose(points[:, :3], XYZ_OF_TABLE)
     assert_allclose(points[:, 3], rows["intensity"] / 255, atol=1e-6)
 
 
@@ -86,7 +90,7 @@ def test_columns_of_any_order_and_type(form):
     ],
 )
 def test_reflectance_is_scaled(form, kind, values, reflectance):
-    rows = table(x="f4", y="f4", z="f4", i=kind)
+    rows = table(**XYZ, i=kind)
     rows["i"] = values
     assert_allclose(form(rows)[0][:, 3], reflectance, atol=1e-6)
 
@@ -97,27 +101,27 @@ NAMES += [("scalar_Intensity", "scalar_Reflectance")]  # a calibrated one goes b
 
 @pytest.mark.parametrize("names", NAMES)
 def test_reflectance_is_recognised_by_its_usual_names(form, names):
-    rows = table(**{"x": "f4", "y": "f4", "z": "f4", "scalar_Time": "f4", **dict.fromkeys(names, "u1")})
+    rows = table(**{**XYZ, "scalar_Time": "f4", **dict.fromkeys(names, "u1")})
     cloud = read_cloud(messages.encode(messages.cloud(rows[None])))
     for points in (form(rows)[0], cloud.points):
         assert_allclose(points[:, 3], rows[names[-1]] / 255, atol=1e-6)
 
 
 def test_fields_of_no_numbers_hold_no_bytes(tmp_path):
-    rows = table(x="f4", y="f4", z="f4", i="u1")
+    rows = table(**XYZ, i="u1")
     head = {"FIELDS": "x _ y z i i _", "SIZE": "4 1 4 4 2 1 8", "TYPE": "F U F F U U F", "COUNT": "1 0 1 1 0 1 0"}
     for data in ("binary", "ascii", "binary_compressed"):
         points, flaws = read(tmp_path / "scan.pcd", pcd(rows, data, **head))
-        assert_allclose(points[:, :3], np.arange(5)[:, None] + [0, 1, 2])
+        assert_allclose(points[:, :3], XYZ_OF_TABLE)
         assert_allclose(points[:, 3], rows["i"] / 255, atol=1e-6)
         assert flaws == []
 
 
 def test_without_reflectance_none_is_recorded(form):
-    assert (form(table(x="f4", y="f4", z="f4"))[0][:, 3] == UNRECORDED).all()
+    assert (form(table(**XYZ))[0][:, 3] == UNRECORDED).all()
 
 
-ROWS = table(x="f4", y="f4", z="f4", i="u1")
+ROWS = table(**XYZ, i="u1")
 
 
 @pytest.mark.parametrize(

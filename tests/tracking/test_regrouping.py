@@ -41,24 +41,33 @@ def reunited(tracks, boxes, rows, points):
     [
         ([WHOLE, FRONT], [REAR, FRONT], [0, 1], (80, 40), {}, [0, 1]),  # has the larger part already
         ([WHOLE, FRONT], [REAR, FRONT], [1, 0], (40, 80), {}, [1, 0]),  # likewise
-        ([WHOLE, FRONT], [REAR, FRONT], [0, 1], (40, 80), {}, [1, 0]),
-        ([WHOLE, FRONT], [REAR, FRONT], [0, 1], (40, 80), {"points": (70, 90), "hits": (3, 2)}, [1, 0]),
-        ([WHOLE, FRONT], [REAR, FRONT], [0, 1], (40, 80), {"points": (70, 90), "hits": (2, 2)}, [0, 1]),
         ([WHOLE, WHOLE, FRONT], [FRONT], [2], 80, {"points": (50, 500, 5)}, [NONE, 0, NONE]),
         ([WHOLE], [REAR, FRONT], [0], (40, 80), {}, [1]),  # the part had no track
         ([FRONT, WHOLE], [WHOLE], [1], 80, {}, [0, NONE]),  # the senior track has seen a fragment only
-        ([WHOLE, FRONT], [REAR, FRONT], [0, 1], (40, 80), {"hits": 1}, [0, 1]),  # it was seen once
         ([WHOLE, NEXT], [REAR, NEXT], [0, 1], (40, 80), {}, [0, 1]),  # together longer than a car
         ([WHOLE], [], [], 0, {}, [NONE]),
-        # background and cars are easily confused, people and cars are not
-        ([WHOLE, FRONT], [REAR, FRONT], [0, 1], (40, 80), {"classes": (BACKGROUND, CAR)}, [1, 0]),
-        ([WHOLE, FRONT], [REAR, FRONT], [0, 1], (40, 80), {"classes": (CAR, PEDESTRIAN)}, [0, 1]),
-        ([WHOLE, FRONT], [REAR, FRONT], [0, 1], (40, 80), {"classes": (BACKGROUND, PEDESTRIAN)}, [0, 1]),
     ],
 )
 def test_the_most_senior_track_takes_the_largest_part(known, seen, rows, points, columns, proposals):
-    classes = columns.pop("classes", [CAR] * len(known))
-    assert reunited(ranked(known, *classes, **columns), seen, rows, points)[0] == proposals
+    assert reunited(ranked(known, *[CAR] * len(known), **columns), seen, rows, points)[0] == proposals
+
+
+@pytest.mark.parametrize(
+    ("classes", "columns", "proposals"),
+    [
+        ((CAR, CAR), {}, [1, 0]),
+        ((CAR, CAR), {"points": (70, 90), "hits": (3, 2)}, [1, 0]),
+        ((CAR, CAR), {"points": (70, 90), "hits": (2, 2)}, [0, 1]),
+        ((CAR, CAR), {"hits": 1}, [0, 1]),  # it was seen once
+        # background and cars are easily confused, people and cars are not
+        ((BACKGROUND, CAR), {}, [1, 0]),
+        ((CAR, PEDESTRIAN), {}, [0, 1]),
+        ((BACKGROUND, PEDESTRIAN), {}, [0, 1]),
+    ],
+)
+def test_a_whole_car_with_the_smaller_of_two_parts_takes_the_larger_one(classes, columns, proposals):
+    tracks = ranked([WHOLE, FRONT], *classes, **columns)
+    assert reunited(tracks, [REAR, FRONT], [0, 1], (40, 80))[0] == proposals
 
 
 def test_a_lost_track_takes_the_part_and_its_former_owner_is_lost():
