@@ -36,6 +36,11 @@ def drive(seconds=1.5, seed=3, scene="yard", phase_s=0.04, **more):
     return [*RobotStream(scene, CORNERS, seconds, seed, of_sensors, **more).sweeps()]
 
 
+def stepped(frames):
+    """Frames with their truths, and the result of each for a robot with a sensor at two corners."""
+    return [*zip(frames, steps(robot(*CORNERS), [frame for frame, _ in frames]), strict=True)]
+
+
 def test_one_sensor_in_the_middle_gives_the_result_of_a_sensor_alone():
     middle = mounted("middle", 0.0, 0.0, 0.0, z=0.6)
     frames = [*SyntheticStream("yard", "vlp-16", 1.0, 3, height_m=0.6)]
@@ -54,7 +59,7 @@ def test_one_sensor_in_the_middle_gives_the_result_of_a_sensor_alone():
 @pytest.mark.parametrize("phase_s", [0.0, 0.04])
 def test_results_are_in_the_frame_of_the_robot(phase_s):
     frames = drive(0.4, phase_s=phase_s)
-    for (frame, truth), result in zip(frames, steps(robot(*CORNERS), [f for f, _ in frames]), strict=True):
+    for (frame, truth), result in stepped(frames):
         assert result.T_world_sensor == pytest.approx(frame.T_world_sensor, abs=1e-3)
         assert phase_s or result.frame.points == pytest.approx(frame.points, abs=1e-3)
         assert result.frame.frame_id == "base_footprint"
@@ -68,7 +73,7 @@ def test_results_are_in_the_frame_of_the_robot(phase_s):
 
 def test_points_of_a_sensor_that_turns_later_are_where_they_are_at_the_stamp():
     frames = drive(0.6, scene="street", phase_s=0.05)
-    for (frame, truth), result in [*zip(frames, steps(robot(*CORNERS), [f for f, _ in frames]), strict=True)][2:]:
+    for (frame, truth), result in stepped(frames)[2:]:
         seen = [sweep for sweep in frame.sweeps if sweep is not None]
         world = [transform(sweep.T_world_sensor, sweep.points[:, :3].astype(float)) for sweep in seen]
         placed = transform(result.T_world_sensor, result.frame.points[:, :3].astype(float))
@@ -96,7 +101,7 @@ def test_a_person_who_walks_from_one_view_into_the_other_keeps_the_track(monkeyp
     frames = drive(7.8, scene="round")
     views = []
     ids = []
-    for (frame, truth), result in zip(frames, steps(robot(*CORNERS), [f for f, _ in frames]), strict=True):
+    for (frame, truth), result in stepped(frames):
         (person,) = truth.bodies.tolist()
         rows = np.flatnonzero(truth.instance == person)
         of_front = rows < len(frame.sweeps[0].points)

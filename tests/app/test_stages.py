@@ -90,12 +90,16 @@ def test_a_clock_that_steps_costs_no_track(posed):
         np.testing.assert_array_equal(result.tracks.x, expected.tracks.x)
 
 
+def ids_of(stages, which):
+    """Ids of the tracks in some of the frames."""
+    return {i for frame in frames()[which] for i in step(stages, frame).tracks.id.tolist()}
+
+
 def test_renewed_stages_begin_without_tracks_and_never_give_an_id_twice():
     stages = stages_of()
-    before = [step(stages, frame) for frame in frames()[:5]]
+    before = ids_of(stages, slice(5))
     stages.recover(anew=True)
-    after = step(stages, frames()[5])
-    assert not set(after.tracks.id.tolist()) & {i for r in before for i in r.tracks.id.tolist()}
+    assert before.isdisjoint(ids_of(stages, slice(5, 6)))
 
 
 def test_a_reload_takes_the_new_profile_and_keeps_the_tracks(tmp_path):
@@ -191,12 +195,11 @@ def test_an_exchanged_sensor_that_cannot_be_compared_is_said_until_it_can(instal
 
 def test_stages_that_cannot_be_renewed_go_on_without_tracks(installation):
     stages = stages_of()
-    before = [step(stages, frame) for frame in frames()[:5]]
+    before = ids_of(stages, slice(5))
     installation(gone=True)
     with pytest.raises(MisuseError, match="installation"):
         stages.recover(anew=True)
-    after = step(stages, frames()[5])
-    assert not set(after.tracks.id.tolist()) & {i for r in before for i in r.tracks.id.tolist()}
+    assert before.isdisjoint(ids_of(stages, slice(5, 6)))
 
 
 def test_a_reload_that_fails_changes_nothing(installation):
@@ -379,23 +382,23 @@ def test_beams_that_the_source_knows_are_used_unless_a_sensor_is_asked_for(asked
     assert chosen.sensor == sensor
 
 
+def faster(frame, every):
+    """The frame as of a head that turns `every` times as fast."""
+    column = np.rint(np.rad2deg(np.arctan2(frame.points[:, 1], frame.points[:, 0])) / 0.2).astype(int)
+    return dataclasses.replace(frame, points=frame.points[column % every == 0])
+
+
 @pytest.mark.parametrize(("every", "step_deg"), [(1, 0.2), (2, 0.4), (5, 0.2)])
 def test_a_head_at_twice_the_speed_of_a_named_profile_has_returns_twice_as_far_apart(every, step_deg, caplog):
     """At other speeds the profile is kept as it was asked for."""
-    frame = frames()[0]
-    column = np.rint(np.rad2deg(np.arctan2(frame.points[:, 1], frame.points[:, 0])) / 0.2).astype(int)
-    faster = dataclasses.replace(frame, points=frame.points[column % every == 0])
-    chosen = choose(profile.resolve("vlp-16"), faster, None)
+    chosen = choose(profile.resolve("vlp-16"), faster(frames()[0], every), None)
     assert chosen.config.sensor.azimuth_step_deg == pytest.approx(step_deg)
     assert chosen.fits == (every < 5)
     assert ("2 times the speed of profile vlp-16" in caplog.text) == (every == 2)
 
 
 def test_a_head_at_twice_the_speed_of_the_profile_that_its_source_names_keeps_it():
-    frame = frames()[0]
-    column = np.rint(np.rad2deg(np.arctan2(frame.points[:, 1], frame.points[:, 0])) / 0.2).astype(int)
-    faster = dataclasses.replace(frame, points=frame.points[column % 2 == 0])
-    chosen = choose(profile.resolve(), faster, dataclasses.replace(INFO, profile="vlp-16"))
+    chosen = choose(profile.resolve(), faster(frames()[0], 2), dataclasses.replace(INFO, profile="vlp-16"))
     assert chosen.sensor == "vlp-16"
     assert chosen.config.sensor.azimuth_step_deg == pytest.approx(0.4)
 

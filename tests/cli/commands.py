@@ -1,9 +1,13 @@
 """Running the commands as a user would."""
 
+import json
 import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
+
+import yaml
 
 from modt.app.build import replay
 from modt.app.inputs import Request
@@ -58,3 +62,8 @@ def refusal(capsys, *arguments: object, program=main) -> str:
 def session(out: Path, frames: int | None, **options) -> Loop:
     """A replay in this process."""
     return replay(Request(mode="efficient", frames=(0, frames), **options), {}, out, None, ["modt"])
+
+
+def content(path: Path) -> Any:
+    """Content of a file of JSON or YAML."""
+    return (json.loads if path.suffix == ".json" else yaml.safe_load)(path.read_text())

@@ -7,7 +7,7 @@ import pytest
 from modt import profile as profiles
 from modt_commands import profile
 
-from .commands import here, modt, refusal
+from .commands import content, here, modt, refusal
 
 pytestmark = pytest.mark.command
 
@@ -34,7 +34,7 @@ def compared(tmp_path_factory):
 
 
 def test_compare_runs_every_mode(compared):
-    tree = json.loads((compared / "other.json").read_text())
+    tree = content(compared / "other.json")
     assert set(tree["modes"]) == {"conventional", "efficient", "accurate"}
     assert tree["modes"]["conventional"]["beta"]["value"] == 1.0
     for saving in tree["savings"].values():
@@ -52,7 +52,7 @@ def test_a_prediction_is_compared_with_what_is_measured(compared, tmp_path, monk
     arguments = ("--frames", "4:8", "--calibration", "other.json", "--observe", "all", "--out", "blind.json")
     assert here("predict", *arguments, program=profile.main) == 0
     assert "efficient: gamma predicted" in capsys.readouterr().out
-    blind = json.loads((tmp_path / "blind.json").read_text())
+    blind = content(tmp_path / "blind.json")
     assert (blind["seen"], blind["calibration"]) == (4, ["elsewhere"])
     arguments = ("--frames", "4:8", "--repeat", 1, "--against", "blind.json")
     assert here("compare", *arguments, program=profile.main) == 0

@@ -1,14 +1,11 @@
 """`modt profile show` and `schema`, and several profiles, from the outside."""
 
-import json
-
 import pytest
-import yaml
 
 from modt import profile
 from modt_commands.profile_schema import schema_text
 
-from .commands import here
+from .commands import content, here
 
 pytestmark = pytest.mark.command
 
@@ -26,8 +23,8 @@ def test_a_run_names_its_profiles(chosen, tmp_path):
     options = (word for name in chosen for word in ("--profile", name))
     assert here("replay", "--frames", "0:2", "--quiet", "--out", tmp_path / "run", *options) == 0
     names = ["hdl-64e", "raspberry-pi-5"]
-    facts = yaml.safe_load((tmp_path / "run" / "run.yaml").read_text())
+    facts = content(tmp_path / "run/run.yaml")
     assert facts["profiles"] == names
     assert facts["recognition"]["used"] == "hdl-64e"
     assert facts["profile"] == profile.dump(profile.load(names))
-    assert json.loads((tmp_path / "run" / "summary.json").read_text())["run"]["profile"] == " + ".join(names)
+    assert content(tmp_path / "run/summary.json")["run"]["profile"] == " + ".join(names)

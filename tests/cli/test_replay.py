@@ -8,7 +8,6 @@ import time
 
 import numpy as np
 import pytest
-import yaml
 
 from modt import profile
 from modt.sinks.tracks import SCHEMA
@@ -17,7 +16,7 @@ from modt_profiling.reporting.records import read_records
 from modt_simulation.synthetic_stream import SyntheticStream
 from tests.sources import layouts
 
-from .commands import begin, here, modt, refusal
+from .commands import begin, content, here, modt, refusal
 
 pytestmark = pytest.mark.command
 
@@ -58,7 +57,7 @@ def test_run_directory_has_the_documented_files(runs, mode):
 
 @pytest.mark.parametrize("mode", MODES)
 def test_report_and_summary_agree_with_the_records(runs, mode, capsys):
-    written = json.loads((runs / mode / "summary.json").read_text())
+    written = content(runs / mode / "summary.json")
     assert here("report", runs / mode, "--json", program=modt_profile) == 0
     report = json.loads(capsys.readouterr().out)
     assert report["frames"] == written["frames"] == FRAMES
@@ -69,10 +68,10 @@ def test_report_and_summary_agree_with_the_records(runs, mode, capsys):
 
 
 def test_run_yaml_and_the_summary_describe_the_run(runs):
-    host = json.loads((runs / "accurate" / "summary.json").read_text())["host"]
+    host = content(runs / "accurate/summary.json")["host"]
     assert host["core"] == max(os.sched_getaffinity(0))
     assert host["one_core_verified"] is True
-    facts = yaml.safe_load((runs / "accurate" / "run.yaml").read_text())
+    facts = content(runs / "accurate/run.yaml")
     assert facts["schema"] == "modt.run/1"
     assert facts["mode"] == "accurate"
     assert len(facts["model"]["sha256"]) == 64
@@ -89,7 +88,7 @@ def test_lines_go_once_to_every_sink_asked_for_and_a_second_run_is_the_same_byte
     for name in ("tracks.jsonl", "kitti/0000.txt", "labels/000003.label"):
         assert (tmp_path / "run" / name).read_bytes() == (runs / "accurate" / name).read_bytes()
     assert done.stderr.count("nobody receives") == 1
-    health = json.loads((tmp_path / "run" / "summary.json").read_text())["sinks"]
+    health = content(tmp_path / "run/summary.json")["sinks"]
     assert [(found["written"], found["failed"]) for found in health.values()] == [(FRAMES, 0)] * 2 + [(0, FRAMES)]
 
 
@@ -124,7 +123,7 @@ def test_bad_scans_are_counted_and_the_rest_goes_on(tmp_path, capsys, caplog):
     (folder / "000001.bin").write_bytes(b"cut")
     assert here("replay", folder, "--out", tmp_path / "run") == 3
     assert [f["frame"] for f in tracks(tmp_path / "run")] == [0, 2]
-    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    summary = content(tmp_path / "run/summary.json")
     assert summary["faults"]["skipped"] == 1
     assert "truncated" in caplog.text
     said = capsys.readouterr()
@@ -133,7 +132,7 @@ def test_bad_scans_are_counted_and_the_rest_goes_on(tmp_path, capsys, caplog):
     read = summary["read"]
     assert (read["messages"], read["sweeps"], read["used"], read["poses"]) == (3, 3, 2, "registration")
     assert list(read["left_out"].values()) == [1]
-    assert yaml.safe_load((tmp_path / "run" / "run.yaml").read_text())["stream"]["read"] == read
+    assert content(tmp_path / "run/run.yaml")["stream"]["read"] == read
 
 
 @pytest.mark.parametrize(("scale", "unlit"), [("hdl-64e", 2), ("none", 0)])
@@ -145,7 +144,7 @@ def test_frames_without_reflectance_are_counted_where_the_sensor_has_it(tmp_path
         (folder / f"{frame.index:06d}.bin").write_bytes(points.tobytes())
     (tmp_path / "own.yaml").write_text(f"sensor:\n  reflectance: {scale}\n")
     assert here("replay", folder, "--profile", tmp_path / "own.yaml", "--out", tmp_path / "run") == 0
-    faults = json.loads((tmp_path / "run" / "summary.json").read_text())["faults"]
+    faults = content(tmp_path / "run/summary.json")["faults"]
     assert faults == {"count": 0, "skipped": 0, "first": None, "frames_without_reflectance": unlit}
     assert ("without reflectance: 2 frames" in capsys.readouterr().out) is (unlit > 0)
     assert caplog.text.count("has no reflectance") == (unlit > 0)
@@ -183,7 +182,7 @@ def test_a_signal_ends_the_run_well(tmp_path, number, status):
     assert process.returncode == status
     assert "Traceback" not in errors
     assert signal.Signals(number).name in errors.splitlines()[-1]
-    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    summary = content(tmp_path / "run/summary.json")
     assert summary["frames"] == len(tracks(tmp_path / "run"))
     assert summary["run"]["stopped_by"] == signal.Signals(number).name
 

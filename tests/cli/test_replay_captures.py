@@ -1,7 +1,5 @@
 """`modt replay` of packets, and of recordings of ROS 2."""
 
-import json
-
 import numpy as np
 import pytest
 
@@ -15,7 +13,7 @@ from tests.sources.bags import BEGAN_S, CLOUD, ODOMETRY, write_mcap
 from tests.sources.packets.simulated import packets
 from tools.send.pcap_writer import write_capture
 
-from .commands import modt, refusal, session
+from .commands import content, modt, refusal, session
 
 pytestmark = pytest.mark.command
 
@@ -32,7 +30,7 @@ def capture(tmp_path):
 def test_a_capture_is_replayed(tmp_path, capture, options, frames):
     done = modt("replay", capture, *options, "--out", "run", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    summary = content(tmp_path / "run/summary.json")
     assert (summary["frames"], summary["faults"]["count"]) == (frames, 0)
     assert summary["run"]["stream"] == "drive"
     assert "leaked" not in done.stderr, "the decoder's library leaks"

@@ -5,14 +5,13 @@ import socket
 
 import numpy as np
 import pytest
-import yaml
 
 from modt.app.systemd import Notifier
 from modt.geometry import inverse, rotation_zyx, se3
 from modt_simulation.synthetic_stream import SyntheticStream
 from tests.sources import layouts
 
-from .commands import refusal, session
+from .commands import content, refusal, session
 
 pytestmark = pytest.mark.command
 
@@ -99,7 +98,7 @@ def test_missing_poses_are_noted_unless_they_come_from_elsewhere(tmp_path, optio
     notes = [*made.stages.info.notes, *made.stages.info.pose_notes]
     assert any("no calibration" in note for note in notes)
     assert any("no odometry" in note for note in notes) == noted
-    written = yaml.safe_load((tmp_path / "run" / "run.yaml").read_text())["stream"]["notes"]
+    written = content(tmp_path / "run/run.yaml")["stream"]["notes"]
     assert written == notes
 
 

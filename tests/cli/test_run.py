@@ -13,7 +13,6 @@ from pathlib import Path
 
 import psutil
 import pytest
-import yaml
 
 from modt import profile
 from modt.sinks.tracks import SCHEMA
@@ -22,7 +21,7 @@ from modt_profiling.reporting.records import read_records
 from modt_simulation.synthetic_stream import SyntheticStream
 from tests import recorded
 
-from .commands import begin, environment, here, modt, refusal
+from .commands import begin, content, environment, here, modt, refusal
 
 pytestmark = pytest.mark.command
 
@@ -92,14 +91,14 @@ def test_a_recording_runs_to_its_end_with_every_sweep_recorded(scans, tmp_path):
     assert done.returncode == 0, done.stderr
     names = {p.name for p in (tmp_path / "run").iterdir()}
     assert names == {"run.yaml", "tracks.jsonl", "ledger.jsonl", "summary.json", "status.json"}
-    status = json.loads((tmp_path / "run" / "status.json").read_text())
+    status = content(tmp_path / "run/status.json")
     frames = [r["frame"] for r in read_records(tmp_path / "run" / "tracks.jsonl", SCHEMA)]
     sensor = status["sensor"]
     assert sensor["sweeps"] == 15
     assert len(frames) == status["counts"]["frames"]
     left_out = sensor["dropped_sweeps"] + status["loop"]["shed_sweeps"] + sensor["faults"]  # on a busy machine
     assert len(frames) + left_out == 15
-    described = yaml.safe_load((tmp_path / "run" / "run.yaml").read_text())
+    described = content(tmp_path / "run/run.yaml")
     assert described["service"] is True
     assert described["recognition"]["used"] == "as found"
     assert "modt_counts_frames_total" in (tmp_path / "modt.prom").read_text()
@@ -142,7 +141,7 @@ def test_systemd_is_notified_of_each_state_and_of_a_reload(start, tmp_path):
     assert status == 0
     assert service.hear("STOPPING=1")
     assert "keep" in said
-    loop = json.loads((service.out / "status.json").read_text())["loop"]
+    loop = content(service.out / "status.json")["loop"]
     assert (loop["reloads"], loop["refused_reloads"]) == (1, 1)
 
 
@@ -176,7 +175,7 @@ def test_the_run_is_seen_in_a_browser_while_it_goes_on(start, chromium):
         tab.press("End")
         tab.until(f"state.at > {before}")
     assert service.end()[0] == 0
-    sink = json.loads((service.out / "status.json").read_text())["sinks"][f"view://127.0.0.1:{port}"]
+    sink = content(service.out / "status.json")["sinks"][f"view://127.0.0.1:{port}"]
     assert (sink["failed"], sink["state"]) == (0, "ok")
 
 
@@ -281,4 +280,4 @@ def test_a_log_that_nobody_reads_stops_neither_the_loop_nor_its_end(scans, tmp_p
             process.kill()
     os.close(reader)
     os.close(writer)
-    assert json.loads((tmp_path / "run" / "summary.json").read_text())["frames"]
+    assert content(tmp_path / "run/summary.json")["frames"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -13,7 +12,7 @@ import pytest
 from modt.schemes import open_sensor
 from modt.sources.recognise import open_stream
 
-from .commands import ROOT, environment
+from .commands import ROOT, content, environment
 from .test_run import Service
 
 pytestmark = [pytest.mark.command, pytest.mark.slow]
@@ -69,7 +68,7 @@ def test_a_service_tracks_what_the_packets_show(port, tmp_path):
     finally:
         service.close()
     assert status == 0, said
-    written = json.loads((service.out / "status.json").read_text())
+    written = content(service.out / "status.json")
     assert (written["profile"], written["sensor"]["refused_messages"]) == ("mid-360", {})
     assert written["sensor"]["sweeps"] >= 6
     assert written["counts"]["tracks"] > 5

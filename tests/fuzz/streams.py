@@ -145,7 +145,7 @@ def mcap(folder):
 @target(MessageError)
 def point_cloud(folder):
     plain = write_cloud(1.5, "lidar", layouts.scan(0))
-    timed = np.zeros((2, 100), [("x", "f4"), ("y", "f4"), ("z", "f4"), ("intensity", "u2"), ("t", "u4")])
+    timed = np.zeros((2, 100), [*messages.XYZ, ("intensity", "u2"), ("t", "u4")])
     turn = np.linspace(3.1, -3.1, 200).reshape(2, 100)
     timed["x"] = np.cos(turn)
     timed["y"] = np.sin(turn)

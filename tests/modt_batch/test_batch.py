@@ -1,6 +1,5 @@
 """`modt batch`: one dataset, whoever computes it and however often it is stopped."""
 
-import json
 import subprocess
 import sys
 from pathlib import Path
@@ -22,7 +21,7 @@ from modt_batch.recording import MEASURED
 from modt_batch.report import mean, worst_first
 from modt_simulation.synthetic_stream import SyntheticStream
 from tests import recorded
-from tests.cli.commands import environment, here, modt, refusal
+from tests.cli.commands import content, environment, here, modt, refusal
 from tests.sources.datasets import Sweep, write_nuscenes
 
 pytestmark = pytest.mark.slow
@@ -215,7 +214,7 @@ def test_a_page_and_a_report_lead_from_the_figures_to_the_worst_run(drives, tmp_
     assert "gamma, accurate" in text
     (page,) = (out / "pages").iterdir()
     assert f'href="pages/{page.name}"' in (out / "report.html").read_text()
-    assert json.loads((out / "batch.json").read_text())["frames"] == [0, 2]
+    assert content(out / "batch.json")["frames"] == [0, 2]
 
 
 def test_means_have_intervals_over_the_recordings():

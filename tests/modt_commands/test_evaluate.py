@@ -6,7 +6,7 @@ import shutil
 
 import pytest
 
-from tests.cli.commands import here, modt, refusal
+from tests.cli.commands import content, here, modt, refusal
 from tests.recorded import drive_and_run
 from tests.viewer.chromium import LOADED, WIDE
 
@@ -48,7 +48,7 @@ def test_runs_are_pooled_by_sensor(drives, capsys):
     assert objects[2] == objects[0] + objects[1] > 0
     assert both["tracks"]["all"]["life"]["frames"] > 0
     assert 0 < both["metrics"]["all"]["HOTA"] <= 1
-    summary = json.loads((drives["vlp-16"][0] / "summary.json").read_text())
+    summary = content(drives["vlp-16"][0] / "summary.json")
     assert one["beta"] == pytest.approx(summary["beta"], abs=1e-6)
 
 

@@ -12,7 +12,7 @@ import yaml
 from modt.classes import CLASS_NAMES, CLASSES, ObjectClass
 from modt.sinks.tracks import SCHEMA
 from modt_profiling.reporting.records import read_records
-from tests.cli.commands import here, refusal
+from tests.cli.commands import content, here, refusal
 from tests.recorded import drive_and_run
 
 
@@ -140,7 +140,7 @@ def copies(recorded, tmp_path):
     run, _ = recorded
     names = ("gone", "bare", "odd", "live")
     made = {name: shutil.copytree(run, tmp_path / "copies" / name) for name in names}
-    described = yaml.safe_load((run / "run.yaml").read_text())
+    described = content(run / "run.yaml")
     described["stream"]["path"] += "_gone"
     (made["gone"] / "run.yaml").write_text(yaml.safe_dump(described))
     described["stream"]["path"] = None

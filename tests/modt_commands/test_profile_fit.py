@@ -1,12 +1,11 @@
 """`modt profile fit`, and recognition of the sensor by `modt replay`, from the outside."""
 
 import pytest
-import yaml
 
 from modt import profile
 from modt_simulation.synthetic_stream import SyntheticStream
 from tests import recorded
-from tests.cli.commands import here, refusal
+from tests.cli.commands import content, here, refusal
 
 pytestmark = pytest.mark.command
 
@@ -43,6 +42,6 @@ def test_misuse_is_one_line_and_status_2(capsys, arguments, named):
 def test_a_sensor_that_is_asked_for_is_used_with_a_warning_where_it_does_not_fit(scans, tmp_path, caplog):
     assert here("replay", scans, "--quiet", "--profile", "hdl-64e", "--out", tmp_path / "run") == 0
     assert "used all the same" in caplog.text
-    facts = yaml.safe_load((tmp_path / "run" / "run.yaml").read_text())
+    facts = content(tmp_path / "run/run.yaml")
     assert facts["recognition"]["used"] == "hdl-64e"
     assert facts["profile"] == profile.dump(profile.load("hdl-64e"))

@@ -28,6 +28,14 @@ pytestmark = pytest.mark.command
 FRAMES = 12
 
 
+def lines_of(path):
+    return [json.loads(line) for line in path.read_text().splitlines()]
+
+
+def write_lines(path, records):
+    path.write_text("".join(json.dumps(record) + "\n" for record in records))
+
+
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     """A run on the synthetic street, and the page of it, which opens at its first frame."""
@@ -39,14 +47,14 @@ def run(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def records(run):
-    return [json.loads(line) for line in (run / "tracks.jsonl").read_text().splitlines()]
+    return lines_of(run / "tracks.jsonl")
 
 
 def test_a_call_costs_in_the_view_what_the_report_attributes_to_it(run):
     copy = shutil.copytree(run, run.with_name("metered"))
-    lines = [json.loads(line) for line in (copy / "ledger.jsonl").read_text().splitlines()]
+    lines = lines_of(copy / "ledger.jsonl")
     metered = [x | {"energy_J": 3 * x["energy_J"], "kind": "measured"} if "energy_J" in x else x for x in lines]
-    (copy / "ledger.jsonl").write_text("".join(json.dumps(line) + "\n" for line in metered))
+    write_lines(copy / "ledger.jsonl", metered)
     spent_mJ = sum(f["call_mJ"] * f["classifications"] for f in RecordedRun.read(copy).frames if "call_mJ" in f)
     reported = run_tree(copy)["parts_J"]["classification"].value * FRAMES
     assert spent_mJ == pytest.approx(1e3 * reported)
@@ -80,7 +88,7 @@ def test_the_page_opens_where_there_is_an_object(run, records, tmp_path):
     background = [record | {"tracks": [t | unpublished for t in record["tracks"]]} for record in records]
     for first, options, begins in ((5, (), 5), (5, ("--frame", 3), 3), (len(records), (), 0)):
         lines = [*background[:first], *records[first:]]
-        (late / "tracks.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
+        write_lines(late / "tracks.jsonl", lines)
         assert here("view", late, *options, "--out", late / "view.html") == 0
         assert Page(late / "view.html").run["start"] == begins
 
@@ -109,8 +117,8 @@ def test_everything_can_be_read(run, chromium, width, dark):
 
 def test_stamps_from_1970_are_times_and_fit_a_narrow_page(run, records, tmp_path, chromium):
     dated = shutil.copytree(run, tmp_path / "dated")
-    lines = [json.dumps(record | {"stamp_s": record["stamp_s"] + 1_400_000_000}) for record in records]
-    (dated / "tracks.jsonl").write_text("\n".join(lines) + "\n")
+    lines = [record | {"stamp_s": record["stamp_s"] + 1_400_000_000} for record in records]
+    write_lines(dated / "tracks.jsonl", lines)
     pytest.importorskip("matplotlib")
     for more in ([], ["--frame", 9]):
         assert here("view", dated, *more) == 0
@@ -247,7 +255,7 @@ def test_a_doubtful_class_has_a_question_mark_in_pages_and_pictures(run, records
     frame = copy.deepcopy(records[9])
     for track in frame["tracks"]:
         track["posterior"] = [0.6, *(0.4 * (track["class"] == name) for name in CLASS_NAMES[1:])]
-    (doubtful / "tracks.jsonl").write_text(json.dumps(frame) + "\n")
+    write_lines(doubtful / "tracks.jsonl", [frame])
     for more in ([], ["--frame", frame["frame"]]):
         done = modt("view", doubtful, *more, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
@@ -360,10 +368,10 @@ def test_truth_of_a_live_run_is_given_by_its_stamps_and_has_the_points(labelled,
     shutil.rmtree(live / "labels")
     text = re.sub(r"path: .*\n(  .*\n)*", "path: null\n", (live / "run.yaml").read_text(), count=1)
     (live / "run.yaml").write_text(f"{text}service: true\n")
-    lines = [json.loads(line) for line in (live / "tracks.jsonl").read_text().splitlines()]
+    lines = lines_of(live / "tracks.jsonl")
     moved = [line | {"frame": line["frame"] + 100, "stamp_s": line["stamp_s"] + 1e9} for line in lines]
     moved[-1]["stamp_s"] += 0.06  # farther than half a period from any scan
-    (live / "tracks.jsonl").write_text("".join(json.dumps(line) + "\n" for line in moved))
+    write_lines(live / "tracks.jsonl", moved)
     viewed(live)
     assert "a live source cannot be read again" in capsys.readouterr().err + caplog.text
     by_stamp = viewed(live, "--truth", drive)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from modt.classes import ObjectClass
-from modt.geometry import transform
 from modt_simulation.movers import MAKERS
 from modt_simulation.obstacles import GAPS_M
 from modt_simulation.postures import NEAR_M, RINGS_M, people
 from modt_simulation.synthetic_stream import SyntheticStream
+from tests.modt_simulation.test_stream import heights_of
 
 
 def world_of(scene, seed, **more):
@@ -63,7 +63,7 @@ def test_who_stands_at_an_open_door_is_between_it_and_the_car():
 @pytest.mark.parametrize("seed", range(3))
 def test_the_ceiling_of_the_car_park_is_low(seed):
     frame, truth = SyntheticStream("carpark", "os1-64", 0.1, seed, height_m=0.5).simulator.sweep(0)
-    z = transform(frame.T_world_sensor, frame.points[:, :3].astype(np.float64))[:, 2]
+    z = heights_of(frame)
     assert 1.95 < np.quantile(z, 0.99) < 2.35
     assert truth.points[[kind.object_class == ObjectClass.CAR for kind in truth.kinds]].sum() > 1000
 
@@ -86,7 +86,7 @@ def test_people_in_postures_are_on_the_rings_and_as_tall_as_they_are_said_to_be(
     for seed in range(14):
         stream = SyntheticStream("postures", "os1-32", 0.1, seed)
         frame, truth = stream.simulator.sweep(0)
-        z = transform(frame.T_world_sensor, frame.points[:, :3].astype(np.float64))[:, 2]
+        z = heights_of(frame)
         world = stream.simulator.world
         for body, n in zip(truth.bodies.tolist(), truth.points.tolist(), strict=True):
             role = world.bodies[body].role

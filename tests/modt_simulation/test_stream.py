@@ -102,6 +102,11 @@ def test_beams_of_a_walking_sensor_stay_cones():
     assert np.abs(elevation_deg[:, None] - beams_deg).min(axis=1).max() < 1e-3
 
 
+def heights_of(frame):
+    """(N,) heights of the points of a frame in the world [m]."""
+    return transform(frame.T_world_sensor, frame.points[:, :3].astype(np.float64))[:, 2]
+
+
 @pytest.mark.parametrize("mount_deg", [(0.0, 15.0), (15.0, 0.0), (180.0, 0.0)])
 def test_a_turned_sensor_sees_the_floor_where_the_mount_says(mount_deg):
     level, turned = (
@@ -113,7 +118,7 @@ def test_a_turned_sensor_sees_the_floor_where_the_mount_says(mount_deg):
         frame, truth = simulator.sweep(0)
         on_floor = (truth.instance == NONE) & (np.hypot(*frame.points[:, :2].T) < 10)
         assert on_floor.sum() > 1000
-        height.append(transform(frame.T_world_sensor, frame.points[on_floor, :3].astype(np.float64))[:, 2])
+        height.append(heights_of(frame)[on_floor])
     assert np.abs(np.concatenate(height)).max() < 0.15
     T = inverse(level.world.ego_pose(0.0)) @ turned.world.ego_pose(0.0)
     np.testing.assert_allclose(T[:3, :3], rotation_zyx(*np.deg2rad([*mount_deg, 0.0])), atol=0.01)
@@ -122,7 +127,7 @@ def test_a_turned_sensor_sees_the_floor_where_the_mount_says(mount_deg):
 @pytest.mark.parametrize("scene", ["hall", "corridor", "lobby", "lift"])
 def test_rooms_have_a_ceiling_above_the_sensor(scene):
     frame, _ = SyntheticStream(scene, "os1-64", 0.1, 2, height_m=0.5).simulator.sweep(0)
-    z = transform(frame.T_world_sensor, frame.points[:, :3].astype(np.float64))[:, 2]
+    z = heights_of(frame)
     top = np.quantile(z, 0.98)
     assert 2.2 < top < 3.6
     assert (np.abs(z - top) < 0.1).mean() > 0.03

@@ -96,14 +96,21 @@ def test_poses_wrong_since_before_anything_was_seen_are_doubted():
 DIRECTION_RAD = np.pi / 4 * np.arange(8)
 ALONG, ACROSS = np.cos(DIRECTION_RAD), np.sin(DIRECTION_RAD)
 """Shift that a metre along x and along y adds to each side of a k-DOP [m]."""
+SQUARE = [1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0]
+
+
+def check_of(kdop):
+    """A check that has seen tracks at rest from the origin."""
+    check = PoseCheck()
+    assert not check.check_drift(0.0, static_tracks(kdop), pose(0.0, 0.0, 0.0))
+    return check
 
 
 @pytest.mark.parametrize(("step_m", "way_m", "drifted"), [(0.1, 0.0, False), (0.3, 0.0, True), (0.3, 10.0, False)])
 def test_what_rested_may_move_by_the_errors_of_a_way(step_m, way_m, drifted):
-    check = PoseCheck()
-    kdop = np.tile([1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0], (8, 1))
+    kdop = np.tile(SQUARE, (8, 1))
     step = step_m * ALONG
-    assert not check.check_drift(0.0, static_tracks(kdop), pose(0.0, 0.0, 0.0))
+    check = check_of(kdop)
     assert not check.check_drift(0.5, static_tracks(kdop + 5 * step), pose(way_m, 0.0, 0.0))  # not looked at so soon
     assert check.check_drift(1.0, static_tracks(kdop + step), pose(way_m, 0.0, 0.0)) == drifted
 
@@ -113,11 +120,9 @@ def test_what_rested_may_move_by_the_errors_of_a_way(step_m, way_m, drifted):
 )
 def test_what_rested_may_move_by_an_error_of_the_scale_of_a_turn(turn_rad, wrong_rad, drifted):
     """Most of what is seen is at 20 m on one side, so that a turn moves it alike."""
-    check = PoseCheck()
     kdop = np.tile([21.0, 15.0, 1.0, -13.0, -19.0, -13.0, 1.0, 15.0], (8, 1))
     step = 20.0 * wrong_rad * ACROSS
-    assert not check.check_drift(0.0, static_tracks(kdop), pose(0.0, 0.0, 0.0))
-    assert check.check_drift(1.0, static_tracks(kdop + step), pose(0.0, 0.0, turn_rad)) == drifted
+    assert check_of(kdop).check_drift(1.0, static_tracks(kdop + step), pose(0.0, 0.0, turn_rad)) == drifted
 
 
 @pytest.mark.parametrize(
@@ -127,11 +132,12 @@ def test_what_rested_may_move_by_an_error_of_the_scale_of_a_turn(turn_rad, wrong
 )
 def test_parts_of_walls_that_move_with_the_sensor_say_nothing_of_its_pose(n_resting, wrong_m, drifted):
     """A pose that moves by half a metre, and 12 parts of a wall that follow the sensor."""
-    check = PoseCheck()
-    kdop = np.tile([1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0], (n_resting + 12, 1))
+    kdop = np.tile(SQUARE, (n_resting + 12, 1))
     moved_m = np.repeat([wrong_m, 0.5], [n_resting, 12])
-    assert not check.check_drift(0.0, static_tracks(kdop), pose(0.0, 0.0, 0.0))
-    assert check.check_drift(1.0, static_tracks(kdop + moved_m[:, None] * ALONG), pose(0.5, 0.0, 0.0)) == drifted
+    assert (
+        check_of(kdop).check_drift(1.0, static_tracks(kdop + moved_m[:, None] * ALONG), pose(0.5, 0.0, 0.0))
+        == drifted
+    )
 
 
 @pytest.mark.parametrize(

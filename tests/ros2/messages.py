@@ -116,11 +116,14 @@ def cloud(data, *, stamp_s=1.0, frame_id="lidar", padding=0):
     )
 
 
+XYZ = [(axis, "f4") for axis in "xyz"]
+XYZI = [*XYZ, ("intensity", "f4")]
+
+
 def xyzi(n, kind=None):
     """(1, n) points of the common layout."""
     rng = np.random.default_rng(n)
-    layout = [("x", "f4"), ("y", "f4"), ("z", "f4"), ("intensity", "f4")] if kind is None else kind
-    points = np.zeros((1, n), layout)
+    points = np.zeros((1, n), XYZI if kind is None else kind)
     for name in "xyz":
         points[name] = rng.uniform(-50, 50, n)
     points["intensity"] = rng.uniform(0, 1, n)

@@ -69,8 +69,7 @@ def test_any_layout_is_read_as_point_by_point(points, padding, little):
     ],
 )
 def test_reflectances_are_scaled_by_what_they_span(kind, values, expected):
-    layout = [("x", "f4"), ("y", "f4"), ("z", "f4"), ("intensity", kind)]
-    points = messages.xyzi(100, layout)
+    points = messages.xyzi(100, [*messages.XYZ, ("intensity", kind)])
     points["intensity"] = values
     assert_allclose(read_cloud(messages.encode(messages.cloud(points))).points[:, 3], expected, atol=1e-6)
 
@@ -105,14 +104,19 @@ def test_a_written_cloud_is_read_by_another_implementation():
     assert len(messages.decode(write_cloud(12.5, "lidar", points[:0]), "sensor_msgs/msg/PointCloud2").data) == 0
 
 
-def turning(*, turn_s=0.1, seam=np.pi, field="time", kind="f4", unit=1e-9, begin=0.0):
-    """Points all round by a head that turns clockwise once, seen `turn_s / 2` before to after straight ahead."""
+def turning(*, turn_s=0.1, seam=np.pi, field="time", kind="f4", unit=1e-9, begin=0.0, wild=None):
+    """Points all round by a head that turns clockwise once, seen `turn_s / 2` before to after straight ahead.
+
+    The time of one of them may be `wild`.
+    """
     bearing = np.linspace(-np.pi, np.pi, 2000, endpoint=False)
-    points = np.zeros((1, 2000), [("x", "f4"), ("y", "f4"), ("z", "f4"), ("intensity", "f4"), (field, kind)])
+    points = np.zeros((1, 2000), [*messages.XYZI, (field, kind)])
     points["x"] = 10 * np.cos(bearing)
     points["y"] = 10 * np.sin(bearing)
     since_seam = np.mod(seam - bearing, 2 * np.pi) if turn_s > 0 else np.mod(bearing - seam, 2 * np.pi)
     points[field] = (begin + abs(turn_s) * since_seam / (2 * np.pi)) / unit
+    if wild is not None:
+        points[field][0, 77] = wild
     return read_cloud(messages.encode(messages.cloud(points, stamp_s=1000.0)))
 
 
@@ -151,7 +155,7 @@ def test_a_sensor_without_a_head_is_stamped_in_the_middle_of_its_times_and_each_
 ):
     rng = np.random.default_rng(5)
     since_s = np.linspace(0.0, 0.1, 2000)
-    points = np.zeros((1, 2000), [*((axis, "f4") for axis in "xyz"), ("timestamp", kind)])
+    points = np.zeros((1, 2000), [*messages.XYZ, ("timestamp", kind)])
     points["x"], points["y"] = rng.uniform(-20, 20, (2, 1, 2000))
     points["timestamp"] = (begin + since_s) / unit
     if kind[0] == "f":
@@ -200,12 +204,6 @@ def test_a_turn_is_known_wherever_its_seam_is(seam, turn_s):
 
 @pytest.mark.parametrize("wild", [1e9, -3.0, np.nan, np.inf])
 def test_a_wild_time_of_a_point_costs_no_deskewing(wild):
-    bearing = np.linspace(np.pi, -np.pi, 512, endpoint=False)
-    points = np.zeros((1, 512), [("x", "f4"), ("y", "f4"), ("z", "f4"), ("intensity", "f4"), ("time", "f8")])
-    points["x"] = 10 * np.cos(bearing)
-    points["y"] = 10 * np.sin(bearing)
-    points["time"] = np.linspace(0, 0.1, 512)
-    points["time"][0, 77] = wild
-    cloud = read_cloud(messages.encode(messages.cloud(points, stamp_s=1000.0)))
+    cloud = turning(kind="f8", unit=1.0, wild=wild)
     assert cloud.turn_s == pytest.approx(0.1, rel=1e-2)
     assert cloud.stamp_s == pytest.approx(1000.05, abs=1e-3)

@@ -20,6 +20,11 @@ def written(tmp_path, frame_result, camera):
     return [line.split() for line in (tmp_path / "kitti" / "0000.txt").read_text().splitlines()]
 
 
+def result_of(box):
+    """Result of a frame with a car that was seen in a (1, 7) box."""
+    return replace(result(0, [5], {0: 1}, {1: CAR}), proposals=proposals([5], box))
+
+
 def test_only_tracks_of_a_class_with_a_proposal_are_written(tmp_path):
     (row,) = written(tmp_path, result(4, [5, 5], {0: 1, 1: 2}, {1: CAR, 3: CAR}, lost=(3,)), forward_camera())
     assert (row[:3], len(row)) == (["4", "1", "Car"], 18)
@@ -33,7 +38,7 @@ def test_only_tracks_of_a_class_with_a_proposal_are_written(tmp_path):
 )
 def test_the_benchmark_decodes_the_same_box(tmp_path_factory, x, y, yaw, size):
     box = np.array([[x, y, -0.5, *size, yaw]])
-    shown = replace(result(0, [5], {0: 1}, {1: CAR}), proposals=proposals([5], box))
+    shown = result_of(box)
     row = written(tmp_path_factory.mktemp("k"), shown, forward_camera())[0]
     h, w, length, cx, cy, cz, ry = map(float, row[10:17])
     # The benchmark's corners: x right, z forward, the box turned by ry about the downward axis.
@@ -57,7 +62,7 @@ def test_without_a_camera_coordinates_are_written_without_image_boxes(tmp_path):
 
 def test_boxes_of_a_tilted_sensor_are_those_of_its_camera(tmp_path):
     box = np.array([[12.0, 2.0, -0.5, 4.0, 1.8, 1.5, 0.0]])
-    shown = replace(result(0, [5], {0: 1}, {1: CAR}), proposals=proposals([5], box))
+    shown = result_of(box)
     mount = Mount.of(0.0, 10.0)
     tilted = replace(shown, frame=replace(shown.frame, R_level_sensor=mount.R_level_sensor))
     level = written(tmp_path / "level", shown, forward_camera())[0]

@@ -399,10 +399,9 @@ def test_an_option_chooses_one_of_several_topics_of_poses(write, tmp_path):
 def test_parts_of_turns_that_are_recorded_out_of_order_are_joined_in_theirs(opened, apart, lost):
     """Those that come much later are counted."""
     bearing = np.linspace(np.pi, -np.pi, 3000, endpoint=False)
-    layout = [(axis, "f4") for axis in "xyz"]
     recorded = []
     for k in range(36):
-        points = np.zeros((1, 1000), layout)
+        points = np.zeros((1, 1000), messages.XYZ)
         seen = bearing[k % 3 * 1000 :][:1000]
         points["x"], points["y"] = 9 * np.cos(seen), 9 * np.sin(seen)
         stamp_s = BEGAN_S + k / 30

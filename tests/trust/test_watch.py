@@ -92,6 +92,14 @@ FAULTS = {
 }
 
 
+def assert_reported_and_withdrawn(levels):
+    """Good before the fault and at the end, and not good from two seconds after its onset on until it ends."""
+    levels = np.array(levels)
+    assert (levels[:ONSET] == TrustLevel.GOOD).all()
+    assert (levels[ONSET + 20 : END] > TrustLevel.GOOD).all()
+    assert levels[-1] == TrustLevel.GOOD
+
+
 @pytest.mark.parametrize("scene", ["street", "hall"])
 def test_a_drive_without_a_fault_is_trusted(scene):
     assert {trust.level for trust in judged(scene)} == {TrustLevel.GOOD}
@@ -99,10 +107,7 @@ def test_a_drive_without_a_fault_is_trusted(scene):
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_a_fault_is_reported_within_two_seconds_and_withdrawn_within_three(name):
-    levels = np.array([trust.level for trust in judged("street", FAULTS[name])])
-    assert (levels[:ONSET] == TrustLevel.GOOD).all()
-    assert (levels[ONSET + 20 : END] > TrustLevel.GOOD).all()
-    assert levels[-1] == TrustLevel.GOOD
+    assert_reported_and_withdrawn([trust.level for trust in judged("street", FAULTS[name])])
 
 
 @pytest.mark.parametrize("posed", [True, False], ids=["posed", "registered"])
@@ -116,10 +121,7 @@ def test_a_fault_that_begins_and_ends_within_a_sweep_is_reported_and_withdrawn_l
         sweep = faulty_from(FAULTS[name], share, k, frame.points)
         given = replace(frame, points=sweep, T_world_sensor=frame.T_world_sensor if posed else None)
         levels.append(watch.add(given, frame.T_world_sensor).level)
-    levels = np.array(levels)
-    assert (levels[:ONSET] == TrustLevel.GOOD).all()
-    assert (levels[ONSET + 20 : END] > TrustLevel.GOOD).all()
-    assert levels[-1] == TrustLevel.GOOD
+    assert_reported_and_withdrawn(levels)
 
 
 @pytest.mark.parametrize("scene", ["street", "yard"])
@@ -155,10 +157,7 @@ def test_a_turn_that_registration_takes_for_a_motion_is_reported_and_withdrawn(s
             T_leapt = T_leapt @ leap
         T_world_sensor = frame.T_world_sensor @ T_leapt
         levels.append(watch.add(replace(frame, points=points, T_world_sensor=None), T_world_sensor).level)
-    levels = np.array(levels)
-    assert (levels[:ONSET] == TrustLevel.GOOD).all()
-    assert (levels[ONSET + 20 : END] > TrustLevel.GOOD).all()
-    assert levels[-1] == TrustLevel.GOOD
+    assert_reported_and_withdrawn(levels)
 
 
 def test_a_turn_explains_the_points_that_a_broken_sweep_before_could_have_seen():

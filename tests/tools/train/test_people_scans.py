@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from modt.classes import ObjectClass
-from modt.segmentation.segmenter import Segmenter
 from modt_simulation.people import PERSON, Person, Posture, people_solids
-from modt_training.crop_writer import label
+from tests.tools.train.scans import assert_same, labels_of
 from tools.train.people_scans import people_scans
 
 SENSORS = ("vlp-16", "mid-360")
@@ -15,16 +14,13 @@ SENSORS = ("vlp-16", "mid-360")
 def test_a_sweep_has_people_and_things():
     for scan in people_scans([1, 2], SENSORS):
         assert set(scan.kinds) <= {ObjectClass.PEDESTRIAN, ObjectClass.BACKGROUND}
-        proposals = Segmenter(scan.profile.segmentation, scan.profile.sensor, scan.fov).segment(scan.points)
-        labels = label(scan, proposals)
+        labels = labels_of(scan)
         assert (labels.kind == ObjectClass.PEDESTRIAN).any()
         assert (labels.majority == ObjectClass.BACKGROUND).any()
 
 
 def test_a_sweep_is_the_same_whenever_it_is_made():
-    first, second = (list(people_scans([7, 8], SENSORS)) for _ in range(2))
-    for a, b in zip(first, second, strict=True):
-        np.testing.assert_array_equal(a.points, b.points)
+    assert_same(*(people_scans([7, 8], SENSORS) for _ in range(2)))
 
 
 def _top_m(posture: Posture, height: float = 1.7, **joints: float) -> float:

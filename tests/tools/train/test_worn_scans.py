@@ -5,14 +5,14 @@ import numpy as np
 from modt.geometry import se3
 from modt.types import Frame
 from modt_simulation.sensors import SENSORS
+from tests.tools.train.scans import assert_same
 from tools.train import worn_scans
 
 
 def test_a_sweep_is_the_same_whenever_it_is_made():
     first, second = (list(worn_scans.worn_scans([5])) for _ in range(2))
     assert len(first) == worn_scans.SWEEPS
-    for a, b in zip(first, second, strict=True):
-        np.testing.assert_array_equal(a.points, b.points)
+    assert_same(first, second)
 
 
 def test_some_beams_are_dead_and_every_second_one_of_a_thinned_sensor():
