@@ -16,6 +16,7 @@ from modt.classification.decision import Decision, LikeliestClass
 from modt.classification.fusion import EveryFrame, FirstViews, FurtherViews
 from modt.classification.pointnet import PointNet
 from modt.classification.prior import Prior, make_prior
+from modt.classification.product_fusion import AnyView, KeyViews
 from modt.classification.scheduler import Scheduler
 from modt.classification.tuning import BatchingTuning, FusionTuning
 from modt.config import (
@@ -57,6 +58,9 @@ from modt.types import UNLIMITED, Budget, Float32, Proposals
 log = logging.getLogger(__name__)
 
 
+MakeFusion = Callable[[FusionConfig, Prior, FusionTuning], FusionStage]
+
+
 @dataclass(frozen=True)
 class Mode:
     """One way of the method over the same stages.
@@ -68,7 +72,7 @@ class Mode:
     """
 
     machine: StateMachine
-    fusion: Callable[[FusionConfig, Prior, FusionTuning], FusionStage]
+    fusion: MakeFusion
     budget: Callable[[ProfileConfig], Budget]
 
 
@@ -76,28 +80,19 @@ def _profile_budget(profile: ProfileConfig) -> Budget:
     return Budget(profile.scheduler.calls_per_frame, mean_ms=profile.classification_ms)
 
 
-MeanRule = Callable[[FusionConfig, Prior, FusionTuning], FusionStage]
-ProductRule = Callable[[FusionConfig, Prior], FusionStage]
-
-
-def _by_rule(mean: MeanRule, product: str) -> MeanRule:
-    """The fusion of the rule that the profile names; the product, given by its name, has nothing that was chosen."""
+def _by_rule(mean: MakeFusion, product: Callable[[FusionConfig, Prior], FusionStage]) -> MakeFusion:
+    """The fusion of the rule that the profile names; the product has nothing that was chosen."""
 
     def fusion(config: FusionConfig, prior: Prior, tuning: FusionTuning) -> FusionStage:
-        if config.rule != "product":
-            return mean(config, prior, tuning)
-        from modt.classification import product_fusion
-
-        of_product: ProductRule = getattr(product_fusion, product)
-        return of_product(config, prior)
+        return product(config, prior) if config.rule == "product" else mean(config, prior, tuning)
 
     return fusion
 
 
 MODES = {
     "conventional": Mode(CONVENTIONAL, lambda config, prior, tuning: EveryFrame(), lambda profile: UNLIMITED),
-    "efficient": Mode(EFFICIENT, _by_rule(FirstViews, "AnyView"), _profile_budget),
-    "accurate": Mode(ACCURATE, _by_rule(FurtherViews, "KeyViews"), _profile_budget),
+    "efficient": Mode(EFFICIENT, _by_rule(FirstViews, AnyView), _profile_budget),
+    "accurate": Mode(ACCURATE, _by_rule(FurtherViews, KeyViews), _profile_budget),
 }
 """Fig. 2a, and the sections on efficient (Table I) and accurate detection (Table II)."""
 

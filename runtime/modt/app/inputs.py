@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl
 
 from modt import profile
+from modt.address import forms
 from modt.config import MountedSensor, OdometryConfig, ProfileConfig
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
@@ -156,7 +157,7 @@ def odometry(request: Request, info: StreamInfo, config: OdometryConfig) -> Pose
     if request.odometry == NONE:
         return NoPoses()
     if "://" not in request.odometry:
-        remedy = f"write one of {RECORDED}, {NONE}, {', '.join(scheme.form for scheme in POSES.values())}"
+        remedy = f"write one of {RECORDED}, {NONE}, {forms(POSES)}"
         raise MisuseError(request.odometry, "is no source of poses", remedy)
     return open_poses(request.odometry, config)
 

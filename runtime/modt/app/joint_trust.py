@@ -61,15 +61,8 @@ class JointWatch:
         if not 0 <= now_s - self._looked_s < self._tuning.look_s:
             self._looked_s = now_s
             self._others.update(dict(others), now_s, frozenset())
-        self.trust = self._judged(now_s)
+        self.trust = self.trust.after([*self._others.reasons.values(), *self._of_sensors(now_s)], now_s)
         return self.trust
-
-    def _judged(self, now_s: float) -> Trust:
-        reasons = [*self._others.reasons.values(), *self._of_sensors(now_s)]
-        reasons.sort(key=lambda reason: (-reason.level, reason.since_s))
-        level = reasons[0].level if reasons else TrustLevel.GOOD
-        since_s = self.trust.since_s if level == self.trust.level else now_s
-        return Trust(level, since_s, tuple(reasons))
 
     def _of_sensors(self, now_s: float) -> Iterator[Reason]:
         """Reasons of the sensors, whose checks are named SENSOR/CHECK."""

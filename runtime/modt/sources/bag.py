@@ -259,8 +259,8 @@ class BagStream:
     def _frame(self, index: int, cloud: PointCloud, message: BagMessage, stamps: StampCheck) -> Frame | None:
         self.reading.sweeps += 1
         self.reading.times[cloud.times] += 1
-        sweep = Sweep(self._stamp_s(cloud, message), cloud.points, cloud.turn_s, mid_rad=cloud.mid_rad)
-        sweep = replace(sweep, delay_s=cloud.delay_s)
+        stamp_s = self._stamp_s(cloud, message)
+        sweep = Sweep(stamp_s, cloud.points, cloud.turn_s, mid_rad=cloud.mid_rad, delay_s=cloud.delay_s)
         return stamps.frame(sweep, message.recorded_s, index, self._topic, self.faults, began_s=self._began[0])
 
     def _pass_over(self, message: BagMessage, stamps: StampCheck) -> None:

@@ -74,8 +74,9 @@ def joint_frame(index: int, sweeps: Sweeps, sensors: Sequence[MountedSensor]) ->
     first = sweeps[lead]
     T = first.T_world_sensor
     T_world_robot = None if T is None else T @ inverse(sensors[lead].T_robot_sensor)
-    frame = Frame(index, first.stamp_s, points, T_world_robot, steady_s=first.steady_s, sweeps=by_sensor)
-    return replace(frame, frame_id=ROBOT)
+    return Frame(
+        index, first.stamp_s, points, T_world_robot, steady_s=first.steady_s, sweeps=by_sensor, frame_id=ROBOT
+    )
 
 
 def joined_reading(parts: Sequence[Reading], alone: Counter[str]) -> Reading:

@@ -9,7 +9,7 @@ import numpy as np
 
 from modt.config import SensorConfig
 from modt.trust.returns import sides
-from modt.trust.sample import SECTORS
+from modt.trust.sample import SECTORS, part_of_turn, turn_of
 from modt.types import Float32
 
 FEW_SHARE = 0.15
@@ -28,21 +28,23 @@ def doubts(sweeps: Sequence[Float32], sensor: SensorConfig) -> Iterator[tuple[bo
         yield True, "the same sweep comes again and again", "restart the sensor and its driver"
     points = sweeps[-1]
     range_m = np.hypot(points[:, 0], points[:, 1])
-    points = points[(range_m > 0) & (range_m < sensor.max_range_m)]
+    seen = (range_m > 0) & (range_m < sensor.max_range_m)
+    points = points[seen]
+    range_m = range_m[seen]
     expected = sensor.rays_per_turn
     if len(points) < FEW_SHARE * expected:
         yield True, f"{len(points)} returns of about {expected:.0f}", "uncover and clean the sensor"
     if not len(points):
         return
-    sector = ((np.arctan2(points[:, 1], points[:, 0]) + np.pi) * (SECTORS / (2 * np.pi))).astype(np.int64) % SECTORS
+    x, y, z, _ = points.T
+    sector = part_of_turn(turn_of(x, y), SECTORS)
     empty = np.bincount(sector, minlength=SECTORS) == 0
     if np.count_nonzero(empty) >= EMPTY_SECTORS:
         what = f"no returns from {sides(empty)} ({360 // SECTORS * np.count_nonzero(empty)} deg)"
         yield False, what, "uncover the sensor, if its field of view is meant to be wider"
-    near_far_m = np.hypot(points[:, 0], points[:, 1])
-    low, high = np.quantile(points[:, 2] / near_far_m, (0.05, 0.95)).tolist()
+    low, high = np.quantile(z / range_m, (0.05, 0.95)).tolist()
     if high - low < ONE_RING:
         yield True, "all returns are at one elevation, as of one beam", "check the sensor, or its driver"
-    reach_m = float(np.quantile(near_far_m, 0.9))
+    reach_m = float(np.quantile(range_m, 0.9))
     if reach_m < NEAR_M:
         yield False, f"nine tenths of the returns are within {reach_m:.1f} m", "look for fog, dust or a cover"

@@ -157,7 +157,7 @@ class TrustWatch:
                 self._mount.add(self._ground.plane, sweep.R_level_sensor)
         self._samples = self._samples[-1:]
         self._looked_s = now_s
-        self.trust = self._judged(now_s)
+        self.trust = self.trust.after(self._debounced.reasons.values(), now_s)
 
     def _changes_now(self) -> bool:
         """Whether to look at the next sweep instead, since something may have begun within the present one."""
@@ -168,12 +168,6 @@ class TrustWatch:
         soon = now.time_s - self._samples[-2].time_s <= MAX_SUDDEN_S
         self._put_off = changed and soon and not self._put_off
         return self._put_off
-
-    def _judged(self, now_s: float) -> Trust:
-        reasons = tuple(sorted(self._debounced.reasons.values(), key=lambda reason: (-reason.level, reason.since_s)))
-        level = reasons[0].level if reasons else TrustLevel.GOOD
-        since_s = self.trust.since_s if level == self.trust.level else now_s
-        return Trust(level, since_s, reasons)
 
     def _run_own_checks(self, sweep: Sample) -> dict[str, Finding]:
         """Run the checks of the sweeps themselves, and return their findings by the name of the check."""

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
+
+from modt.types.arrays import Self
 
 
 class TrustLevel(IntEnum):
@@ -41,6 +44,12 @@ class Trust:
     since_s: float = 0.0
     reasons: tuple[Reason, ...] = ()
     visibility_m: float | None = None  # meteorological visibility, None where it is good or not known
+
+    def after(self, reasons: Iterable[Reason], now_s: float) -> Self:
+        """The trust that follows this one, by the reasons that there are now, the worst and oldest first."""
+        ordered = tuple(sorted(reasons, key=lambda reason: (-reason.level, reason.since_s)))
+        level = ordered[0].level if ordered else TrustLevel.GOOD
+        return type(self)(level, self.since_s if level == self.level else now_s, ordered)
 
     @property
     def word(self) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import math
 from collections import deque
-from dataclasses import replace
 from statistics import fmean
 
 from modt import host
@@ -111,8 +110,16 @@ class PointCloudReader:
             if cloud is None:
                 return []
         stamp_s = cloud.stamp_s or message.sent_s
-        sweep = Sweep(stamp_s, cloud.points, cloud.turn_s, frame_id=cloud.frame_id, mid_rad=cloud.mid_rad)
-        return [replace(sweep, delay_s=cloud.delay_s)]
+        return [
+            Sweep(
+                stamp_s,
+                cloud.points,
+                cloud.turn_s,
+                frame_id=cloud.frame_id,
+                mid_rad=cloud.mid_rad,
+                delay_s=cloud.delay_s,
+            )
+        ]
 
     def _watch(self, cloud: PointCloud, sent_s: float) -> None:
         """Keep a message until it is known whether messages are parts of turns."""

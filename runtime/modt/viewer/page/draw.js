@@ -122,7 +122,7 @@ function trail(row) {
 // The reported class with its posterior; with a question mark below one half, as in `uncertain` of tracks.jsonl.
 const reported = (row, digits) => {
   const { name } = run.classes[row.class], p = row[`p_${name}`];
-  if (p === undefined) return name.replaceAll("_", " ");
+  if (p === undefined) return words(name);
   return `${name}${row.class && p < 0.5 ? "?" : ""} ${(100 * p).toFixed(digits)} %`;
 };
 const label = (row) => `#${row.id} ${reported(row, 0)}`;

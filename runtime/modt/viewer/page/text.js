@@ -6,6 +6,8 @@ const add = (parent, tag, text = "", more = {}) => {
   return made;
 };
 
+const words = (name) => name.replaceAll("_", " ");
+
 // Seconds from the begin of a recording, or the time of day of a stamp that counts from 1970.
 const time = (stamp) => stamp < 1e8 ? `${stamp.toFixed(2)} s` : new Date(1000 * stamp).toISOString().slice(11, 22);
 
@@ -22,7 +24,7 @@ function describe(row) {
   const side = SIDES[(Math.round(Math.atan2(row.y, row.x) / (Math.PI / 4)) + 8) % 8], heading = headingOf(row);
   const nearer = -(row.x * Math.cos(heading) + row.y * Math.sin(heading)) / rangeOf(row);
   const whither = nearer > 0.7 ? "comes nearer" : nearer < -0.7 ? "goes away" : "crosses";
-  const name = run.classes[row.class].name.replaceAll("_", " ");
+  const name = words(run.classes[row.class].name);
   return `${name} #${row.id}, ${rangeOf(row).toFixed(0)} m ${side}, ${row.world_speed_mps.toFixed(1)} m/s, ${whither}`;
 }
 
@@ -34,7 +36,7 @@ function showAround(rows) {
     const n = rows.filter((row) => row.class === k).length;
     const line = add(element("classes"), "span", "", { className: n ? "" : "none" });
     add(line, "i").style.background = colour;
-    line.append(`${n} ${name.replaceAll("_", " ")}`);
+    line.append(`${n} ${words(name)}`);
   });
 }
 
@@ -90,7 +92,7 @@ function showFrame() {
 const percent = (row, { name }) => `${name} ${(100 * row[`p_${name}`]).toFixed(1)} %`;
 const trained = (row) => run.classes.filter(({ name }) => row[`p_${name}`] !== undefined);
 const motion = (row) => trained(row).slice(1).map(({ name }) => `${name} ${row[`motion_${name}`].toFixed(1)}`).join(", ");
-const stateOf = (row) => run.states[row.state].name.replaceAll("_", " ");
+const stateOf = (row) => words(run.states[row.state].name);
 
 // Every classification of a track, and every change of its state and of the class that is reported.
 function events(rows) {
@@ -99,7 +101,7 @@ function events(rows) {
     if (row.classified) {
       const posterior = trained(row).map((c) => percent(row, c)).join(", ");
       const view = [row.l, row.w, row.h].map((side) => side.toFixed(1)).join(" × ");
-      const range = Math.hypot(row.x, row.y).toFixed(0);
+      const range = rangeOf(row).toFixed(0);
       found.push([row.at, `classified: ${row.points} points, ${view} m at ${range} m: ${posterior}`]);
     }
     const before = rows[k - 1] || {};
@@ -131,7 +133,7 @@ function legend(id, entries, outline) {
     const line = add(element(id), "span"), mark = add(line, "i");
     mark.style[outline ? "borderColor" : "background"] = colour;
     if (outline) mark.className = "outline";
-    line.append(name.replaceAll("_", " "));
+    line.append(words(name));
   }
 }
 
