@@ -71,6 +71,8 @@ def frame_record(r: FrameResult) -> dict[str, Any]:
 
 
 CAR = [0.1, 0.7, 0.1, 0.1]
+TWO = [5, 4], {0: 1, 1: 2}, {1: CAR}
+"""Two tracks with a proposal each, of which the first one is a car."""
 PEDESTRIAN = [0.1, 0.1, 0.7, 0.1]
 
 

@@ -11,7 +11,7 @@ from modt.energy.ledger import StageWork
 from modt.energy.meters.meter import Kind
 from modt.errors import ModtError
 from modt.reporting.summary import Summary
-from tests.results import CAR, energy_window, result, status
+from tests.results import TWO, energy_window, result, status
 
 
 def test_metrics_are_valid_lines_with_one_type_each():
@@ -44,7 +44,7 @@ def test_counts_are_of_what_is_seen_and_the_rate_of_the_time_since_the_last_repo
     counter = FrameCounter(totals, 10.0)
     assert counter.report(10.0).tracks == 0
     for k in range(20):
-        totals.add_result(result(k, [5, 4], {0: 1, 1: 2}, {1: CAR}, lost=(3,), classified=1))
+        totals.add_result(result(k, *TWO, lost=(3,), classified=1))
     counts = counter.report(12.0)
     assert (counts.frames, counts.rate_hz, counts.tracks) == (20, 10.0, 3)
     assert counts.visible["car"] == 1

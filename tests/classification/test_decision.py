@@ -35,13 +35,16 @@ def test_the_likelier_object_is_reported_where_missing_it_costs_more(missed_cost
     assert table.object_class.tolist() == [reported]
 
 
+DOUBTED_ONCE = [[1 - walks, 0.0, walks, 0.0] for walks in (*[0.9] * 20, 0.26)]
+
+
 @pytest.mark.parametrize(
     ("cost", "posteriors", "reported"),
     [
         (1.0, [[1 - car, car, 0.0, 0.0] for car in (0.6, 0.45, 0.41, 0.39, 0.45, 0.51)], [1, 1, 1, 0, 0, 1]),
         (1.0, [[0.1, 0.0, walks, 0.9 - walks] for walks in (0.6, 0.42, 0.39, 0.42)], [2, 2, 3, 3]),
-        (1.0, [[1 - walks, 0.0, walks, 0.0] for walks in (*[0.9] * 20, 0.26)], [2] * 20 + [0]),
-        (3.0, [[1 - walks, 0.0, walks, 0.0] for walks in (*[0.9] * 20, 0.26)], [2] * 20 + [2]),  # costly to miss
+        (1.0, DOUBTED_ONCE, [2] * 20 + [0]),
+        (3.0, DOUBTED_ONCE, [2] * 20 + [2]),  # costly to miss
     ],
 )
 def test_the_reported_class_is_kept_until_another_one_is_clearly_likelier(cost, posteriors, reported):

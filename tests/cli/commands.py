@@ -32,6 +32,13 @@ def modt(*arguments: object, cwd: Path, module: str = "modt.cli.main", **options
     return subprocess.run(command, check=False, **options)
 
 
+def succeeded(*arguments: object, **options) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end, which is a good one."""
+    done = modt(*arguments, **options)
+    assert done.returncode == 0, done.stderr
+    return done
+
+
 def begin(*arguments: object, cwd: Path, env: dict[str, str] | None = None) -> subprocess.Popen[str]:
     """Start a command and leave it running."""
     command = [sys.executable, "-m", "modt.cli.main", *map(str, arguments)]

@@ -7,7 +7,7 @@ import pytest
 from modt import profile as profiles
 from modt_commands import profile
 
-from .commands import content, here, modt, refusal
+from .commands import content, here, refusal, succeeded
 
 pytestmark = pytest.mark.command
 
@@ -27,8 +27,7 @@ def compared(tmp_path_factory):
     """Folder in which the modes were compared: other.json and page.html."""
     folder = tmp_path_factory.mktemp("compared")
     options = ("--frames", "0:8", "--repeat", 1, "--json", "--html", "page.html")
-    done = modt("compare", *options, cwd=folder, module="modt_commands.profile")
-    assert done.returncode == 0, done.stderr
+    done = succeeded("compare", *options, cwd=folder, module="modt_commands.profile")
     (folder / "other.json").write_text(done.stdout)
     return folder
 

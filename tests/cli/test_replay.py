@@ -16,7 +16,7 @@ from modt_profiling.reporting.records import read_records
 from modt_simulation.synthetic_stream import SyntheticStream
 from tests.sources import layouts
 
-from .commands import begin, content, here, modt, refusal
+from .commands import begin, content, here, modt, refusal, succeeded
 
 pytestmark = pytest.mark.command
 
@@ -31,8 +31,7 @@ def runs(tmp_path_factory):
     options = ("--frames", f"0:{FRAMES}", "--labels", "--out")
     for mode in MODES[:2]:
         assert here("replay", "--mode", mode, *options, root / mode) == 0
-    done = modt("replay", "--mode", "accurate", *options, "accurate", cwd=root)
-    assert done.returncode == 0, done.stderr
+    done = succeeded("replay", "--mode", "accurate", *options, "accurate", cwd=root)
     assert "results in accurate" in done.stdout
     assert "%|" not in done.stderr, "no bar in a pipe"
     return root
@@ -82,8 +81,9 @@ def test_run_yaml_and_the_summary_describe_the_run(runs):
 def test_lines_go_once_to_every_sink_asked_for_and_a_second_run_is_the_same_byte_for_byte(runs, tmp_path):
     sinks = ("-", "-", f"file://{tmp_path}/lines.jsonl", f"unix://{tmp_path}/gone.sock")
     options = (word for sink in sinks for word in ("--sink", sink))
-    done = modt("replay", "--frames", f"0:{FRAMES}", "--quiet", "--labels", "--out", "run", *options, cwd=tmp_path)
-    assert done.returncode == 0
+    done = succeeded(
+        "replay", "--frames", f"0:{FRAMES}", "--quiet", "--labels", "--out", "run", *options, cwd=tmp_path
+    )
     assert done.stdout == (tmp_path / "lines.jsonl").read_text() == (runs / "accurate" / "tracks.jsonl").read_text()
     for name in ("tracks.jsonl", "kitti/0000.txt", "labels/000003.label"):
         assert (tmp_path / "run" / name).read_bytes() == (runs / "accurate" / name).read_bytes()
@@ -189,8 +189,7 @@ def test_a_signal_ends_the_run_well(tmp_path, number, status):
 
 @pytest.mark.kitti
 def test_a_real_drive_in_the_cameras_view(drive_0005, tmp_path):
-    done = modt("replay", drive_0005, "--fov", "camera", "--frames", "0:12", "--out", "run", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    succeeded("replay", drive_0005, "--fov", "camera", "--frames", "0:12", "--out", "run", cwd=tmp_path)
     frames = tracks(tmp_path / "run")
     assert len(frames) == 12
     assert 15 < np.mean([f["proposals"] for f in frames]) < 120

@@ -13,7 +13,7 @@ from tests.sources.bags import BEGAN_S, CLOUD, ODOMETRY, write_mcap
 from tests.sources.packets.simulated import packets
 from tools.send.pcap_writer import write_capture
 
-from .commands import content, modt, refusal, session
+from .commands import content, refusal, session, succeeded
 
 pytestmark = pytest.mark.command
 
@@ -28,8 +28,7 @@ def capture(tmp_path):
 
 @pytest.mark.parametrize(("options", "frames"), [(("--capture", "model=vlp-16"), 3), (("--frames", "50:"), 0)])
 def test_a_capture_is_replayed(tmp_path, capture, options, frames):
-    done = modt("replay", capture, *options, "--out", "run", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    done = succeeded("replay", capture, *options, "--out", "run", cwd=tmp_path)
     summary = content(tmp_path / "run/summary.json")
     assert (summary["frames"], summary["faults"]["count"]) == (frames, 0)
     assert summary["run"]["stream"] == "drive"

@@ -21,7 +21,7 @@ from modt_profiling.reporting.records import read_records
 from modt_simulation.synthetic_stream import SyntheticStream
 from tests import recorded
 
-from .commands import begin, content, environment, here, modt, refusal
+from .commands import begin, content, environment, here, modt, refusal, succeeded
 
 pytestmark = pytest.mark.command
 
@@ -87,8 +87,7 @@ def start(scans, tmp_path):
 
 
 def test_a_recording_runs_to_its_end_with_every_sweep_recorded(scans, tmp_path):
-    done = modt("run", scans, "--out", tmp_path / "run", "--metrics", tmp_path / "modt.prom", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    succeeded("run", scans, "--out", tmp_path / "run", "--metrics", tmp_path / "modt.prom", cwd=tmp_path)
     names = {p.name for p in (tmp_path / "run").iterdir()}
     assert names == {"run.yaml", "tracks.jsonl", "ledger.jsonl", "summary.json", "status.json"}
     status = content(tmp_path / "run/status.json")
@@ -187,8 +186,7 @@ def test_a_killed_service_has_lost_no_more_than_a_second_and_starts_again(scans,
     service.process.communicate()
     frames = list(read_records(service.out / "tracks.jsonl", SCHEMA))
     assert len(frames) > 5
-    again = modt("run", scans, "--out", service.out, cwd=tmp_path)
-    assert again.returncode == 0, again.stderr
+    succeeded("run", scans, "--out", service.out, cwd=tmp_path)
     assert len(list(read_records(tmp_path / "run~1" / "tracks.jsonl", SCHEMA))) == len(frames)
 
 
@@ -251,8 +249,7 @@ def test_where_nothing_can_be_recorded_the_loop_goes_on_and_the_end_says_so(scan
     (tmp_path / "file").write_text("")
     (tmp_path / "others" / "lost+found").mkdir(parents=True)
     metrics = tmp_path / "missing" / "modt.prom"
-    done = modt("run", scans, "--out", tmp_path / out, "--metrics", metrics, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    done = succeeded("run", scans, "--out", tmp_path / out, "--metrics", metrics, cwd=tmp_path)
     assert "Traceback" not in done.stderr
     assert "nothing is recorded, " in done.stderr.splitlines()[-1]
     assert cause in done.stderr.splitlines()[-1]

@@ -11,7 +11,7 @@ from modt.schemes import SINKS, open_sink
 from modt.sinks.kitti import KittiResults, PointLabels
 from modt.sinks.output import LedgerSink, LineFile
 from modt.sinks.tracks import frame_line
-from tests.results import CAR, ledger_line, result
+from tests.results import CAR, TWO, ledger_line, result
 
 FILES = {
     "tracks": lambda root: LineFile(root / "tracks.jsonl", frame_line),
@@ -31,7 +31,7 @@ ADDRESSES = {
 EXTRAS = {"mcap": "foxglove", "foxglove": "foxglove"}
 FRAMES = [
     result(0, [], {}),
-    result(1, [5, 4], {0: 1, 1: 2}, {1: CAR}),
+    result(1, *TWO),
     result(2, [4], {0: 1}, {1: CAR}, lost=(2,)),
     result(7, [], {}, lost=(1, 2)),
 ]

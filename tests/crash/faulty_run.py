@@ -49,7 +49,7 @@ from modt.sources.stream import StreamInfo
 from modt.types import UNLIMITED, Frame
 from modt_profiling.reporting.records import read_records
 from tests.crash.failing_calls import Faults
-from tests.results import CAR, result
+from tests.results import TWO, result
 from tests.sequences.makers import MAKERS
 
 TURNS = 40
@@ -100,7 +100,7 @@ def stages_with(odometry: PoseSocket) -> Mock:
 
     def step(frame: Frame, budget: Any, *, reduced: bool) -> Any:
         odometry.place(frame)
-        return result(frame.index, [5, 4], {0: 1, 1: 2}, {1: CAR})
+        return result(frame.index, *TWO)
 
     request = SimpleNamespace(mode="accurate", fov="full")
     config = ProfileConfig()

@@ -6,7 +6,7 @@ import shutil
 
 import pytest
 
-from tests.cli.commands import content, here, modt, refusal
+from tests.cli.commands import content, here, refusal, succeeded
 from tests.recorded import drive_and_run
 from tests.viewer.chromium import LOADED, WIDE
 
@@ -21,8 +21,7 @@ def drives(tmp_path_factory):
 
 
 def test_the_page_has_the_figures_and_their_plots(drives, tmp_path, chromium):
-    done = modt("evaluate", *drives["vlp-16"], "--html", "page.html", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    done = succeeded("evaluate", *drives["vlp-16"], "--html", "page.html", cwd=tmp_path)
     with chromium.tab((tmp_path / "page.html").as_uri(), width=390, ready=LOADED) as tab:
         assert not tab.value(WIDE)
         assert done.stdout.strip() in tab.value("document.querySelector('pre').textContent")

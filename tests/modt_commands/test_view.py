@@ -18,7 +18,7 @@ from modt.viewer import theme
 from modt_profiling.reporting.run_report import run_tree
 from modt_profiling.reporting.run_sums import run_facts
 from modt_viewer.recorded_run import RecordedRun
-from tests.cli.commands import environment, here, modt, refusal
+from tests.cli.commands import environment, here, modt, refusal, succeeded
 from tests.recorded import drive_and_run
 from tests.viewer.chromium import LOADED, SETTLED, WIDE
 from tests.viewer.pages import Page
@@ -257,8 +257,7 @@ def test_a_doubtful_class_has_a_question_mark_in_pages_and_pictures(run, records
         track["posterior"] = [0.6, *(0.4 * (track["class"] == name) for name in CLASS_NAMES[1:])]
     write_lines(doubtful / "tracks.jsonl", [frame])
     for more in ([], ["--frame", frame["frame"]]):
-        done = modt("view", doubtful, *more, cwd=tmp_path)
-        assert done.returncode == 0, done.stderr
+        succeeded("view", doubtful, *more, cwd=tmp_path)
     pictured = re.findall(r">(#\d+ [^<]+)<", (doubtful / f"view-{frame['frame']}.svg").read_text())
     opened = [label for label in chromium.opened(doubtful / "view.html")["labels"] if label.startswith("#")]
     for labels in (pictured, opened):

@@ -35,13 +35,17 @@ def judged(truth, blobs, tracks=ONE, rules=KITTI_RULES, **more):
     return judge(frame(truth, blobs, tracks, **more), rules)[:2]
 
 
+HALF = [(blob(28, 10), 0), (blob(12, 10), NONE), (blob(27, 10, 5), 0)]
+"""A proposal of most of a car and as much of something else."""
+
+
 @pytest.mark.parametrize(
     ("blobs", "outcome"),
     [
         ([(blob(40, 10), 0)], Outcome.DETECTED),
         ([(blob(40, 10), 0), (blob(50, 10, 5), 0)], Outcome.MERGED),
         ([(blob(19, 10), 0), (blob(19, 9.8), 1), (blob(2, 10), NONE)], Outcome.SPLIT),
-        ([(blob(28, 10), 0), (blob(12, 10), NONE), (blob(27, 10, 5), 0)], Outcome.PARTIAL),
+        (HALF, Outcome.PARTIAL),
         ([(blob(15, 10), 0), (blob(25, 10), NONE)], Outcome.MISSED),
         ([(blob(40, 10), NONE)], Outcome.MISSED),
     ],
@@ -63,8 +67,7 @@ def test_points_near_the_ground_are_of_the_box_but_not_of_the_object():
 
 @pytest.mark.parametrize(("rules", "label"), [(KITTI_RULES, CAR), (CUBOID_RULES, BACKGROUND)])
 def test_half_of_each_other_or_iou(rules, label):
-    blobs = [(blob(28, 10), 0), (blob(12, 10), NONE), (blob(27, 10, 5), 0)]
-    assert judged(cars(10.0), blobs, rules=rules)[1]["label"].tolist() == [label]
+    assert judged(cars(10.0), HALF, rules=rules)[1]["label"].tolist() == [label]
 
 
 def test_objects_of_few_points():

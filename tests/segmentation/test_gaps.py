@@ -23,8 +23,7 @@ def degrees(gaps):
 def without_beam(dead_deg, x, y=0.0):
     """A sweep of a car without a beam, and which of its points are on the car."""
     points, on = scans.scan([(x, y, *CAR)], MOUNT_M, scans.VLP_16, step_deg=0.2)
-    elevation_deg = np.rad2deg(np.arctan2(points[:, 2], np.hypot(points[:, 0], points[:, 1])))
-    alive = np.abs(elevation_deg - dead_deg) > 0.5
+    alive = np.abs(scans.elevation_deg(points) - dead_deg) > 0.5
     return points[alive], on[alive] == 1
 
 

@@ -50,6 +50,7 @@ SENSOR = SensorConfig()
 FULL = FieldOfView()
 FRONT = FieldOfView(np.array([[0.0, 1.0, 0.0, 0.0]]))
 SEEDS = st.integers(0, 10_000)
+GENERATORS = st.builds(np.random.default_rng, SEEDS)
 HOSTILE = [np.nan, np.inf, -np.inf, 1e-45, -1e-40, 3e38, -3e38, FAR_M, 999.0, 0.0, -0.0]
 
 
@@ -199,10 +200,9 @@ def test_cells_and_components(kernels, seed, n, sigma):
     assert same(*(k.view_bounds(clusters, number, number.max() + 1) for k in (NUMPY, kernels)))
 
 
-@given(seed=SEEDS, sizes=st.lists(st.integers(1, 60), min_size=1, max_size=8), extra=st.integers(0, 9))
+@given(rng=GENERATORS, sizes=st.lists(st.integers(1, 60), min_size=1, max_size=8), extra=st.integers(0, 9))
 @settings(max_examples=60, deadline=None)
-def test_groups(kernels, seed, sizes, extra):
-    rng = np.random.default_rng(seed)
+def test_groups(kernels, rng, sizes, extra):
     labels = rng.permutation(np.repeat(np.append(np.arange(len(sizes)), NONE), [*sizes, extra]))
     groups = Groups.from_labels(labels, len(sizes))
     assert same(groups, kernels.group(labels, len(sizes)))
@@ -289,17 +289,16 @@ PASSES = {
 
 
 @pytest.mark.parametrize(("name", "arguments"), PASSES.items())
-@given(seed=SEEDS, n=st.integers(0, 60))
+@given(rng=GENERATORS, n=st.integers(0, 60))
 @settings(max_examples=300, deadline=None)
-def test_passes_on_random_input(kernels, name, arguments, seed, n):
-    given = arguments(np.random.default_rng(seed), n)
+def test_passes_on_random_input(kernels, name, arguments, rng, n):
+    given = arguments(rng, n)
     assert same(*(getattr(each, name)(*given) for each in (NUMPY, kernels)))
 
 
-@given(seed=SEEDS, n=st.integers(0, 6), dt_s=st.sampled_from([0.0, 0.1, 3.0]))
+@given(rng=GENERATORS, n=st.integers(0, 6), dt_s=st.sampled_from([0.0, 0.1, 3.0]))
 @settings(max_examples=60, deadline=None)
-def test_observed_tracks(kernels, seed, n, dt_s):
-    rng = np.random.default_rng(seed)
+def test_observed_tracks(kernels, rng, n, dt_s):
     boxes = rng.uniform(-20, 20, (n, 7))
     boxes[:, 3:6] = rng.uniform(0.1, 9.0, (n, 3))
     seen, rows = observe(frame_of(boxes)[1], np.eye(4)), rng.permutation(n)
@@ -311,10 +310,9 @@ def test_observed_tracks(kernels, seed, n, dt_s):
     assert same(*tables)
 
 
-@given(seed=SEEDS, m=st.integers(0, 5), dt_s=st.sampled_from([0.0, 0.1, 3.0]))
+@given(rng=GENERATORS, m=st.integers(0, 5), dt_s=st.sampled_from([0.0, 0.1, 3.0]))
 @settings(max_examples=60, deadline=None)
-def test_resting_and_moving_tracks(kernels, seed, m, dt_s):
-    rng = np.random.default_rng(seed)
+def test_resting_and_moving_tracks(kernels, rng, m, dt_s):
     start = rng.normal(0, 30, (m, 2))
     later = start + rng.normal(0, 1, (2, m, 2))
     tables = []
@@ -326,10 +324,9 @@ def test_resting_and_moving_tracks(kernels, seed, m, dt_s):
     assert same(*tables)
 
 
-@given(seed=SEEDS, n=st.integers(1, 5), rays=st.sampled_from([1, 500, 10**6]))
+@given(rng=GENERATORS, n=st.integers(1, 5), rays=st.sampled_from([1, 500, 10**6]))
 @settings(max_examples=40, deadline=None)
-def test_lines_of_sight(kernels, seed, n, rays):
-    rng = np.random.default_rng(seed)
+def test_lines_of_sight(kernels, rng, n, rays):
     boxes = rng.uniform(-12, 12, (n + 2, 7))
     boxes[:, 2] = rng.uniform(-1, 1, n + 2)
     boxes[:, 3:6] = rng.uniform(0.1, 4.0, (n + 2, 3))
@@ -373,9 +370,8 @@ def test_every_pass_is_compiled():
     assert passes - {"name"} <= compiled
 
 
-@given(SEEDS)
-def test_people_within_a_cluster_are_the_same(kernels, seed):
-    rng = np.random.default_rng(seed)
+@given(GENERATORS)
+def test_people_within_a_cluster_are_the_same(kernels, rng):
     heads = [person(*rng.uniform(-1, 1, 2), rng.uniform(1.2, 2.6)) for _ in range(rng.integers(4))]
     parts = [*heads, *[part for part in (TROLLEY - [5.5, 0, 0, 0, 0], *BICYCLE) if rng.random() < 0.4], person(0, 0)]
     x, y, low, high, points, tuning = arguments(*parts)

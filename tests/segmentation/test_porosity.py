@@ -5,9 +5,7 @@ import pytest
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
-from modt.native import library
 from modt.segmentation.kernels import NUMPY
-from modt.segmentation.native_kernels import NativeKernels
 from modt.segmentation.porosity import RayDensity
 from modt.segmentation.segmenter import Segmenter
 from modt.types import PointKind
@@ -64,10 +62,7 @@ def test_a_sweep_thinner_than_the_profile_is_not_air():
 
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.6])
 def test_compiled_kernels_find_the_same_air(share):
-    try:
-        native = NativeKernels(*library.load())
-    except library.NotAvailableError as error:
-        pytest.skip(str(error))
+    native = scans.compiled_kernels()
     points, _ = hazy(share, boxes=(PERSON, (6.0, 3.0, 4.0, 1.8, 0.3, 1.5)))
     expected = segmented(points)
     found = segmented(points, native)

@@ -7,15 +7,14 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.native import library
 from modt.segmentation.cells import CellClusterer
 from modt.segmentation.clustering import Clusterer
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.kernels import NUMPY
-from modt.segmentation.native_kernels import NativeKernels
 from modt.segmentation.structure import find_surfaces
 from modt.segmentation.tuning import SegmentationTuning
 from modt.types import NONE, PointKind
+from tests.segmentation.scans import compiled_kernels
 
 TUNING = SegmentationTuning().structure
 SENSOR = SensorConfig(max_range_m=60.0, azimuth_step_deg=0.2)
@@ -112,10 +111,7 @@ def test_a_beam_above_does_not_join_people():
 
 
 def test_compiled_kernels_find_the_same_parts():
-    try:
-        kernels = NativeKernels(*library.load())
-    except library.NotAvailableError as error:
-        pytest.skip(str(error))
+    kernels = compiled_kernels()
     rng = np.random.default_rng(5)
     clusterer = CellClusterer(SENSOR, SegmentationConfig())
     for _ in range(30):

@@ -13,7 +13,7 @@ from modt.sinks.recording import AtOnce, Recording, count_dropped
 from modt.sinks.run_directory import MARK, RunDirectory
 from modt.sinks.tracks import SCHEMA
 from modt_profiling.reporting.records import read_records
-from tests.results import CAR, result
+from tests.results import TWO, result
 
 OURS = f"schema: modt.run/1\n{MARK}\n"
 
@@ -93,7 +93,7 @@ def begun(folder, writer=None, time=None, **config):
 
 
 def frame(k):
-    return result(k, [5, 4], {0: 1, 1: 2}, {1: CAR})
+    return result(k, *TWO)
 
 
 def parts(folder):

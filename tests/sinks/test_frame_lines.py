@@ -10,10 +10,10 @@ from modt.schemes import open_sink
 from modt.sinks.background import Background
 from modt.sinks.frame_lines import MAX_BYTES, Descriptor
 from modt.sinks.tracks import frame_line, frame_parts
-from tests.results import CAR, frame_record, result
+from tests.results import TWO, frame_record, result
 from tests.sinks.test_background import settled
 
-FRAME, LATER = (result(k, [5, 4], {0: 1, 1: 2}, {1: CAR}, lost=(7,)) for k in (3, 4))
+FRAME, LATER = (result(k, *TWO, lost=(7,)) for k in (3, 4))
 
 
 @pytest.mark.parametrize("rest", ["", '{"schema":"mo'])

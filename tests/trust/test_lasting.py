@@ -13,6 +13,7 @@ from modt.trust.sample import sample
 from modt.trust.tuning import LastingTuning
 from modt.types import Frame
 from modt_simulation.synthetic_stream import SyntheticStream
+from tests.segmentation.scans import elevation_deg
 
 LOOK_S = 0.6
 SENSOR = load("vlp-16").sensor
@@ -32,10 +33,6 @@ def looks(fault=None, from_s=0.0, seconds=30.0, sensor=SENSOR):
         if fault and time_s >= from_s:
             points = fault(points)
         yield sample(Frame(k, time_s, points), np.eye(4), sensor, np.zeros(3))
-
-
-def elevation_deg(points):
-    return np.rad2deg(np.arctan2(points[:, 2], np.hypot(points[:, 0], points[:, 1])))
 
 
 def bearing_deg(points):

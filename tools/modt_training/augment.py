@@ -68,8 +68,7 @@ def augment(crops: Crops, sensors: Sensors, rng: Generator) -> tuple[Crops, Sens
     xyz += rng.normal(0, POINT_NOISE_M, xyz.shape)
     rho = np.hypot(*centre[:, :2].T)
     xyz[:, 2] += (rng.normal(0, 1, n) * (GROUND_NOISE_M + GROUND_NOISE_SLOPE * rho))[crop_of_point]
-    offsets = np.append(0, np.cumsum(np.bincount(crop_of_point[keep], minlength=n)))
-    return Crops(xyz[keep].astype(np.float32), offsets), sensors
+    return _kept(xyz, keep, crop_of_point, n), sensors
 
 
 def worn(crops: Crops, sensors: Sensors, rng: Generator) -> Crops:
@@ -79,15 +78,23 @@ def worn(crops: Crops, sensors: Sensors, rng: Generator) -> Crops:
     xyz = crops.xyz.astype(np.float64)
     sigma_m = np.where(rng.random(n) < NOISY_SHARE, rng.uniform(0.0, MAX_NOISE_M, n), 0.0)
     error_m = sigma_m[crop_of_point] * rng.standard_normal(len(xyz))
-    elevation_deg = np.rad2deg(np.arctan2(xyz[:, 2], np.hypot(xyz[:, 0], xyz[:, 1])))
-    beam = np.floor(elevation_deg / sensors.elevation_deg[crop_of_point] + rng.random(n)[crop_of_point])
+    beam = np.floor(_elevation_deg(xyz) / sensors.elevation_deg[crop_of_point] + rng.random(n)[crop_of_point])
     _, beam_of_crop = np.unique(crop_of_point << 16 | beam.astype(np.int64) + 32768, return_inverse=True)
     lost_share = rng.choice(LOST_BEAMS, n)
     is_lost = rng.random(len(xyz))[beam_of_crop] < lost_share[crop_of_point]
     keep = _keep_enough(np.ones(len(xyz), np.bool_), ~is_lost, crop_of_point, n)
     xyz *= 1.0 + (error_m / np.linalg.norm(xyz, axis=1))[:, None]
+    return _kept(xyz, keep, crop_of_point, n)
+
+
+def _kept(xyz: Float64, keep: Bool, crop_of_point: Int, n: int) -> Crops:
+    """The n crops of the points that are kept."""
     offsets = np.append(0, np.cumsum(np.bincount(crop_of_point[keep], minlength=n)))
     return Crops(xyz[keep].astype(np.float32), offsets)
+
+
+def _elevation_deg(xyz: Float64) -> Float64:
+    return np.asarray(np.rad2deg(np.arctan2(xyz[:, 2], np.hypot(xyz[:, 0], xyz[:, 1]))))
 
 
 def subsample(crops: Crops, limit: int, rng: Generator) -> Crops:
@@ -141,9 +148,7 @@ def _one_return_per_beam(xyz: Float64, crop_of_point: Int, sensors: Sensors, rng
     """
     n = len(sensors.ground_z_m)
     azimuth = np.rad2deg(np.arctan2(xyz[:, 1], xyz[:, 0])) / sensors.azimuth_deg[crop_of_point]
-    elevation = (
-        np.rad2deg(np.arctan2(xyz[:, 2], np.hypot(xyz[:, 0], xyz[:, 1]))) / sensors.elevation_deg[crop_of_point]
-    )
+    elevation = _elevation_deg(xyz) / sensors.elevation_deg[crop_of_point]
     # Cells of one beam and one azimuth step, with an offset of their own in each crop.
     cell = np.stack([azimuth, elevation], axis=1) + rng.random((n, 2))[crop_of_point]
     column, beam = np.floor(cell).astype(np.int64).T + 32768

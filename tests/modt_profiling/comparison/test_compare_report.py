@@ -26,6 +26,11 @@ BUSY_W = 5.0
 FACTS = Facts(name="board", unit="J", resolution=1e-6, max_W=100.0, scope=Scope.CPU, kind=Kind.MEASURED)
 
 
+def two_cars(index):
+    """Result of a frame with two cars."""
+    return result(index, [3, 4], {0: 7, 1: 8}, {7: CAR, 8: CAR})
+
+
 class Board:
     """A pipeline whose work moves the clocks and the counter of a board.
 
@@ -51,7 +56,7 @@ class Board:
 
     def seen(self, index):
         """Result of a frame, and the tracks that are classified."""
-        return result(index, [3, 4], {0: 7, 1: 8}, {7: CAR, 8: CAR}), [7, 8] * (index % self.every == 0)
+        return two_cars(index), [7, 8] * (index % self.every == 0)
 
     def step(self, frame, budget=UNLIMITED):
         found, classified = self.seen(frame.index)

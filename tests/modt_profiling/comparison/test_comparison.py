@@ -2,13 +2,13 @@ import pytest
 
 from modt.types import UNLIMITED, Budget
 from modt_profiling.comparison.comparison import COUNTS, ModeRun, interleave, total
-from tests.modt_profiling.comparison.test_compare_report import FRAMES, Board
+from tests.modt_profiling.comparison.test_compare_report import FRAMES, Board, two_cars
 from tests.results import CAR, result
 
 SCRIPT = [
-    result(0, [3, 4], {0: 7, 1: 8}, {7: CAR, 8: CAR}),
+    two_cars(0),
     result(1, [3], {0: 7}, {7: CAR}, lost=(8,)),
-    result(2, [3, 4], {0: 7, 1: 8}, {7: CAR, 8: CAR}),
+    two_cars(2),
     result(3, [5], {0: 9}),
     result(4, [], {}),
     result(5, [5], {0: 9}, {9: CAR}),
