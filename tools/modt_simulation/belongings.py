@@ -6,6 +6,7 @@ import numpy as np
 from numpy.random import Generator
 
 from modt_simulation.materials import Material
+from modt_simulation.scenery import chair_legs
 from modt_simulation.solids import Solids, block, box, cylinder, ellipsoid, rod
 
 SIDES = (-1, 1)
@@ -72,10 +73,7 @@ def seat(rng: Generator, height: float) -> Solids:
         wide = rng.uniform(0.9, 2.0)
         feet = [box((-0.05, s * wide / 2.4, tall / 2), (0.4, 0.06, tall), Material.WOOD) for s in SIDES]
         return Solids.join([box((-0.05, 0.0, tall - 0.03), (0.45, wide, 0.06), Material.WOOD), *feet])
-    legs = [
-        rod((i * 0.2, j * 0.2, 0.0), (i * 0.18, j * 0.18, tall), 0.018, Material.METAL) for i in SIDES for j in SIDES
-    ]
-    parts = [box((0.0, 0.0, tall - 0.03), (0.45, 0.45, 0.06), Material.WOOD), *legs]
+    parts = [box((0.0, 0.0, tall - 0.03), (0.45, 0.45, 0.06), Material.WOOD), *chair_legs(tall)]
     if kind == 2:
         parts.append(box((-0.23, 0.0, rng.uniform(0.65, 0.8)), (0.04, 0.42, rng.uniform(0.25, 0.6)), Material.WOOD))
     return Solids.join(parts)

@@ -154,15 +154,19 @@ def table(rng: Generator) -> Solids:
     return Solids.join([top, *(cylinder((x, y, tall / 2), 0.03, tall, Material.METAL) for x, y in legs)])
 
 
-def chair(rng: Generator) -> Solids:
-    """A chair."""
-    legs = [
-        rod((i * 0.2, j * 0.2, 0.0), (i * 0.18, j * 0.18, 0.45), 0.018, Material.METAL)
+def chair_legs(tall: float) -> list[Solids]:
+    """The four legs of a chair or a stool."""
+    return [
+        rod((i * 0.2, j * 0.2, 0.0), (i * 0.18, j * 0.18, tall), 0.018, Material.METAL)
         for i in (-1, 1)
         for j in (-1, 1)
     ]
+
+
+def chair(rng: Generator) -> Solids:
+    """A chair."""
     back = box((-0.21, 0, 0.75), (0.04, 0.42, 0.35), Material.WOOD)
-    return Solids.join([box((0, 0, 0.46), (0.45, 0.45, 0.05), Material.WOOD), back, *legs])
+    return Solids.join([box((0, 0, 0.46), (0.45, 0.45, 0.05), Material.WOOD), back, *chair_legs(0.45)])
 
 
 def shelf(rng: Generator) -> Solids:
