@@ -23,8 +23,15 @@ from tests.tracking.tracking_scenes import (
 )
 
 BACKGROUND, CAR, PEDESTRIAN, CYCLIST = ObjectClass
-WHOLE, REAR, FRONT = (box(x, 3, length, 1.8, 1.5) for x, length in ((10, 4.2), (8.6, 1.4), (11.1, 2.0)))
-AHEAD = box(15, 3, 4.2, 1.8, 1.5)
+
+
+def of_car(x, length):
+    """Box as wide and high as a car."""
+    return box(x, 3, length, 1.8, 1.5)
+
+
+WHOLE, REAR, FRONT = of_car(10, 4.2), of_car(8.6, 1.4), of_car(11.1, 2.0)
+AHEAD = of_car(15, 4.2)
 SLIM = box(11.1, 3, 0.6, 0.6, 1.5)
 TALLER = box(11.1, 3, 0.6, 0.6, 1.8, z=-0.85)
 POINTS = 80
@@ -54,15 +61,15 @@ def merged(tracks, boxes, rows):
         ([WHOLE], [PEDESTRIAN], [REAR, FRONT], {}, False),
         ([WHOLE], [CAR], [REAR, FRONT], {"hits": 3}, False),  # seen too few times
         ([WHOLE], [BACKGROUND], [REAR, FRONT], {"hits": 3}, False),
-        ([WHOLE], [CAR], [REAR, box(13.0, 3, 1.5, 1.8, 1.5)], {}, False),  # ahead of the car
+        ([WHOLE], [CAR], [REAR, of_car(13.0, 1.5)], {}, False),  # ahead of the car
         ([WHOLE], [CAR], [REAR, box(11.1, 4.2, 2.0, 1.8, 1.5)], {}, False),  # reaches beyond its side
-        ([WHOLE], [CAR], [FRONT, box(13.0, 3, 2.0, 1.8, 1.5)], {}, False),  # both as long as the car, most ahead
-        ([WHOLE], [CAR], [REAR, box(11.65, 3, 2.6, 1.8, 1.5)], {}, False),  # most within, both longer than the car
+        ([WHOLE], [CAR], [FRONT, of_car(13.0, 2.0)], {}, False),  # both as long as the car, most ahead
+        ([WHOLE], [CAR], [REAR, of_car(11.65, 2.6)], {}, False),  # most within, both longer than the car
         ([WHOLE, FRONT], [CAR, PEDESTRIAN], [REAR, FRONT], {}, False),
         ([WHOLE, FRONT], [CAR, CYCLIST], [REAR, FRONT], {}, False),
         ([WHOLE, FRONT], [CAR, BACKGROUND], [REAR, FRONT], {}, True),
         ([WHOLE], [BACKGROUND], [REAR, FRONT], {}, True),
-        ([box(10, 3, 7.0, 1.8, 1.5)], [BACKGROUND], [REAR, FRONT], {}, False),  # longer than a car
+        ([of_car(10, 7.0)], [BACKGROUND], [REAR, FRONT], {}, False),  # longer than a car
         ([WHOLE, FRONT], [BACKGROUND, BACKGROUND], [REAR, FRONT], {}, True),
         ([WHOLE, FRONT], [BACKGROUND, CAR], [REAR, FRONT], {}, False),
         ([WHOLE, FRONT], [BACKGROUND, PEDESTRIAN], [REAR, FRONT], {}, False),
@@ -111,8 +118,8 @@ def test_a_wheel_is_a_part_of_its_cyclist(known, classes, seen, hits, is_part):
     assert len(after.proposals) == (1 if is_part else 2)
 
 
-NEAR_END = box(10.5, 3, 2.0, 1.8, 1.5)
-NEXT = box(12.1, 3, 0.8, 1.8, 1.5)
+NEAR_END = of_car(10.5, 2.0)
+NEXT = of_car(12.1, 0.8)
 
 
 @pytest.mark.parametrize(
@@ -120,9 +127,9 @@ NEXT = box(12.1, 3, 0.8, 1.8, 1.5)
     [
         ([NEAR_END], [CAR], [NEAR_END, NEXT], [10], True),
         ([NEAR_END], [BACKGROUND], [NEAR_END, NEXT], [10], False),
-        ([NEAR_END], [CAR], [NEAR_END, box(12.6, 3, 0.8, 1.8, 1.5)], [10], False),  # a gap of .7 m
-        ([NEAR_END], [CAR], [NEAR_END, box(13.6, 3, 3.8, 1.8, 1.5)], [10], False),  # 6 m together
-        ([WHOLE], [CAR], [NEAR_END, box(13.5, 3, 3.6, 1.8, 1.5)], [10], False),  # the car is known to be longer
+        ([NEAR_END], [CAR], [NEAR_END, of_car(12.6, 0.8)], [10], False),  # a gap of .7 m
+        ([NEAR_END], [CAR], [NEAR_END, of_car(13.6, 3.8)], [10], False),  # 6 m together
+        ([WHOLE], [CAR], [NEAR_END, of_car(13.5, 3.6)], [10], False),  # the car is known to be longer
         ([NEAR_END], [CAR], [NEAR_END, box(12.1, 3, 0.6, 0.6, 1.5)], [10], False),  # may be a person
         ([NEAR_END, NEXT], [CAR, BACKGROUND], [NEAR_END, NEXT], [10, 2], False),  # as many points as the car shows
         ([NEAR_END, NEXT], [CAR, PEDESTRIAN], [NEAR_END, NEXT], [10, 2], False),
@@ -135,14 +142,14 @@ def test_a_part_that_comes_into_view_lies_beside_what_is_known_of_a_car(known, c
 
 
 def test_a_car_takes_the_proposal_that_covers_half_of_it_from_a_fragment():
-    tracks = tracks_at([box(10, 3, 2.0, 1.8, 1.5), box(11.9, 3, 0.6, 1.8, 1.5)], CAR, BACKGROUND, hits=[10, 2])
-    seen = [box(11.5, 3, 3.0, 1.8, 1.5)]  # matched with the fragment
+    tracks = tracks_at([of_car(10, 2.0), of_car(11.9, 0.6)], CAR, BACKGROUND, hits=[10, 2])
+    seen = [of_car(11.5, 3.0)]  # matched with the fragment
     assert regrouped(tracks, frame_at_rest(tracks, seen, 1)).matches.rows.tolist() == [0]
 
 
 def test_a_car_takes_all_its_parts():
-    parts = [box(7.0, 3, 2.0, 1.8, 1.5), box(9.4, 3, 2.0, 1.8, 1.5), box(12.5, 3, 3.0, 1.8, 1.5)]
-    assert merged(tracks_at([box(10, 3, 9.0, 1.8, 1.5)], CAR), parts, [0])[0] == [[0, 1, 2]]
+    parts = [of_car(7.0, 2.0), of_car(9.4, 2.0), of_car(12.5, 3.0)]
+    assert merged(tracks_at([of_car(10, 9.0)], CAR), parts, [0])[0] == [[0, 1, 2]]
 
 
 @pytest.mark.parametrize(
@@ -150,10 +157,10 @@ def test_a_car_takes_all_its_parts():
     [
         (0.0, 5.5, [WHOLE, AHEAD], [[0], [1]]),  # the proposal of an older car is no part
         (6.5, 0.0, [WHOLE, AHEAD], [[0, 1]]),
-        (3.5, 3.5, [WHOLE, AHEAD, box(12.5, 3, 0.5, 1.8, 1.5)], [[0, 2], [1]]),  # both know it: the older takes it
-        (0.0, 3.5, [WHOLE, AHEAD, box(12.5, 3, 0.5, 1.8, 1.5)], [[0], [1, 2]]),
+        (3.5, 3.5, [WHOLE, AHEAD, of_car(12.5, 0.5)], [[0, 2], [1]]),  # both know it: the older takes it
+        (0.0, 3.5, [WHOLE, AHEAD, of_car(12.5, 0.5)], [[0], [1, 2]]),
         # the near one is a part of the older car, but for the one that it gains itself
-        (3.5, 0.0, [WHOLE, box(14.2, 3, 2.6, 1.8, 1.5), box(16.4, 3, 1.3, 1.8, 1.5)], [[0], [1, 2]]),
+        (3.5, 0.0, [WHOLE, of_car(14.2, 2.6), of_car(16.4, 1.3)], [[0], [1, 2]]),
     ],
 )
 def test_of_two_cars_the_older_takes_parts_and_proposals_of_the_younger(ahead_m, behind_m, seen, groups):
@@ -252,6 +259,6 @@ def test_the_known_extent_grows_up_to_the_size_of_the_class(object_class, length
 
 def test_what_surrounds_the_part_last_seen_and_lies_outside_the_known_extent_is_no_part():
     tracks = tracks_at([WHOLE], CAR)
-    strip = box(12, 3, 0.2, 1.8, 1.5)
+    strip = of_car(12, 0.2)
     tracks.kdop[:] = tracks_at([strip]).kdop
-    assert len(regrouped(tracks, frame_at_rest(tracks, [strip, box(12.7, 3, 1.5, 1.8, 1.5)], 0)).proposals) == 2
+    assert len(regrouped(tracks, frame_at_rest(tracks, [strip, of_car(12.7, 1.5)], 0)).proposals) == 2

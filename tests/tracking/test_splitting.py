@@ -27,7 +27,13 @@ BACKGROUND = ObjectClass.BACKGROUND
 CAR = ObjectClass.CAR
 PEDESTRIAN = ObjectClass.PEDESTRIAN
 WALL = box(12, 3.2, l=16.0, w=0.3, h=2.5, z=-0.5)
-PERSON = box(10, 2.5, 0.6, 0.6, 1.7, z=-0.85)
+
+
+def person_at(x, y):
+    return box(x, y, 0.6, 0.6, 1.7, z=-0.85)
+
+
+PERSON = person_at(10, 2.5)
 PERSON_POINTS = 80
 WALL_POINTS = 400
 
@@ -70,7 +76,7 @@ def test_the_points_of_a_person_are_split_off_a_wall_and_measure_its_position_al
 @pytest.mark.parametrize("step_m", [-0.12, 0.0, 0.12])
 def test_a_piece_moves_its_track_along_the_wall(step_m):
     """The ends along the wall are free: nobody else is near them."""
-    tracks = tracks_of_person_and_wall(person=box(10 - step_m, 2.5, 0.6, 0.6, 1.7, z=-0.85))
+    tracks = tracks_of_person_and_wall(person=person_at(10 - step_m, 2.5))
     after = split(tracks, wall_with(PERSON), rows=[1])
     position = after.matches.position[after.matches.rows == 0][0]
     assert position == pytest.approx([10.0, 2.5], abs=0.06)
@@ -124,8 +130,8 @@ def test_the_reflectance_of_a_piece_is_unknown():
         (PEDESTRIAN, {"missed": 1}, PERSON, 80, WALL),  # lost before
         (PEDESTRIAN, {}, PERSON, 12, WALL),  # too few points where it is expected
         (PEDESTRIAN, {}, box(10, 2.5, 0.6, 0.6, 0.9, z=-1.25), 80, box(12, 3, 16.0, 0.3, 0.9, z=-1.2)),  # lower
-        (PEDESTRIAN, {}, box(10, -4, 0.6, 0.6, 1.7, z=-0.85), 80, WALL),  # in another place
-        (PEDESTRIAN, {}, PERSON, 80, box(10, 2.6, 0.6, 0.6, 1.7, z=-0.85)),  # no longer than the track
+        (PEDESTRIAN, {}, person_at(10, -4), 80, WALL),  # in another place
+        (PEDESTRIAN, {}, PERSON, 80, person_at(10, 2.6)),  # no longer than the track
     ],
 )
 def test_only_what_a_track_expects_is_split_off(object_class, columns, person, points, wall):
@@ -186,7 +192,7 @@ def follow(follower, bodies, i, T=EYE, together=()):
 
 
 def walker(i, y=2.5):
-    return box(8 + STEP_M * i, y, 0.6, 0.6, 1.7, z=-0.85)
+    return person_at(8 + STEP_M * i, y)
 
 
 @pytest.mark.parametrize("pose", [lambda i: EYE, driving], ids=["stationary", "driving"])
@@ -206,7 +212,7 @@ def test_two_pedestrians_who_meet_keep_their_tracks(wall_y, together):
     follower = Follower()
     wall = [12, wall_y, *WALL[2:]]
     for i in range(TOUCH + 12):
-        bodies = [walker(i, y=2.0), box(12.2 - STEP_M * i, 2.85, 0.6, 0.6, 1.7, z=-0.85), wall]
+        bodies = [walker(i, y=2.0), person_at(12.2 - STEP_M * i, 2.85), wall]
         ids, shares = follow(follower, bodies, i, together=together if i in {14, 15} else ())
         assert ids == [0, 1, 2]
         assert min(shares) > 0.95
@@ -230,7 +236,7 @@ def test_a_piece_is_expected_where_the_head_saw_it_not_at_the_middle_of_the_wall
 
 def test_the_piece_lies_where_the_filter_expects_its_track():
     """The track moved by half a metre since it was observed, for the second time."""
-    tracks = tracks_of_person_and_wall(person=box(9.5, 2.5, 0.6, 0.6, 1.7, z=-0.85), hits=2)
+    tracks = tracks_of_person_and_wall(person=person_at(9.5, 2.5), hits=2)
     tracks.x[0, 0] += 0.5
     after = split(tracks, wall_with(PERSON), rows=[1])
     assert sorted(after.proposals.members[WALL_POINTS:]) == list(range(PERSON_POINTS))
