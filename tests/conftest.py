@@ -6,6 +6,7 @@ import os
 import socket
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 
@@ -30,6 +31,12 @@ def kitti_root() -> Path:
     if not root:
         pytest.skip("KITTI_ROOT is not set: no real data here")
     return Path(root)
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    """Random numbers, the same in each test."""
+    return np.random.default_rng(0)
 
 
 @pytest.fixture

@@ -77,8 +77,7 @@ def test_an_ellipsoid_is_hit_on_its_surface():
     np.testing.assert_allclose(np.linalg.norm(met - [10.0, 3.0, 0.5], axis=1), 2.0, atol=1e-4)
 
 
-def test_foliage_transmits_by_its_density():
-    rng = np.random.default_rng(0)
+def test_foliage_transmits_by_its_density(rng):
     hedge = box((20.0, 0.0, 0.0), (1.0, 12.0, 12.0), Material.FOLIAGE, density=1.5)
     depth = rng.standard_exponential(NO_GROUND.shape, np.float32)
     image = RayCaster(sensor("vlp-16")).cast(hedge, NO_GROUND, depth)

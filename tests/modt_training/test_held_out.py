@@ -83,8 +83,7 @@ def test_the_box_tells_objects_from_background_alone():
     assert_allclose(posterior[:, 1], posterior[:, 3])
 
 
-def test_calibration_recovers_temperature_and_class_offsets():
-    rng = np.random.default_rng(0)
+def test_calibration_recovers_temperature_and_class_offsets(rng):
     true = rng.normal([2.0, 0, 0, 0], 2.0, (6000, 4))
     share = IDENTITY.apply(true)
     label = np.array([rng.choice(4, p=p) for p in share])
@@ -96,8 +95,7 @@ def test_calibration_recovers_temperature_and_class_offsets():
     assert top_calibration_error(IDENTITY.apply(distorted), label) > 0.1
 
 
-def test_calibration_folds_into_the_last_layer():
-    rng = np.random.default_rng(0)
+def test_calibration_folds_into_the_last_layer(rng):
     calibration = Calibration(1.7, np.array([0.0, -1.0, 0.5, 2.0]))
     x = rng.normal(size=(5, 8))
     weight = rng.normal(size=(8, 4))
@@ -124,8 +122,7 @@ def test_recall_counts_the_objects_called_right_at_the_precision():
     assert recall_at(0.8, score, ~right, every, wanted, row)["of_all"] == 0.0
 
 
-def test_scores_are_of_the_posterior_under_the_class_frequency_of_the_sensor():
-    rng = np.random.default_rng(0)
+def test_scores_are_of_the_posterior_under_the_class_frequency_of_the_sensor(rng):
     n = 4000
     frequency = np.array([[0.9, 0.05, 0.03, 0.02], [0.4, 0.2, 0.2, 0.2]])
     sensor = np.repeat([0, 1], n)

@@ -75,8 +75,7 @@ def test_recordings_without_an_object_teach_nothing(tmp_path, drives):
         check_examples(replace(data, label=np.zeros_like(data.label)))
 
 
-def test_what_lies_between_the_classes_or_out_of_the_sector_is_unlabelled():
-    rng = np.random.default_rng(0)
+def test_what_lies_between_the_classes_or_out_of_the_sector_is_unlabelled(rng):
     places = np.array([[10.0, 0.0], [0.0, 10.0], [10.0, 3.0]])
     points = np.concatenate([np.c_[p + rng.uniform(-0.3, 0.3, (30, 2)), rng.uniform(-1, 0, (30, 2))] for p in places])
     points = points.astype(np.float32)

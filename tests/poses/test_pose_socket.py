@@ -157,9 +157,8 @@ def test_a_frame_near_enough_to_two_poses_has_one(pair, poses, asked, x):
         assert (None if T is None else T[0, 3]) == (None if x is None else pytest.approx(x))
 
 
-def test_extrapolation_does_not_amplify_noise():
+def test_extrapolation_does_not_amplify_noise(rng):
     ring = PoseBuffer(OdometryConfig())
-    rng = np.random.default_rng(0)
     for k in range(200):
         ring.add(0.005 * k, matrix([0.05 * k + rng.normal(0, 0.005), 0.0, 0.0]))
     T = ring.at(0.995 + 0.1)

@@ -109,12 +109,11 @@ def test_modt_itself_replays_the_points_and_the_poses(tmp_path):
         np.testing.assert_allclose(frame.T_world_sensor, sent.T_world_sensor, atol=1e-9)
 
 
-def test_the_oldest_parts_make_room_and_nothing_else(tmp_path):
+def test_the_oldest_parts_make_room_and_nothing_else(tmp_path, rng):
     (tmp_path / "a-note.mcap").write_bytes(bytes(100_000))
     sizes = []
     limit = 200_000
     sink = McapRecorder(tmp_path / "a.mcap", OPTIONS, max_bytes=limit)
-    rng = np.random.default_rng(0)
     for k in range(200):
         frame = moving(k)
         frame.frame.points[:] = rng.normal(size=frame.frame.points.shape)

@@ -349,8 +349,7 @@ def test_the_frame_of_the_points_may_lack_the_namespace_of_the_transforms(opened
 
 
 @pytest.mark.parametrize("package", ["livox_ros_driver2", "livox_ros_driver"])
-def test_messages_of_livox_own_type_are_read_with_the_times_of_their_points(opened, package):
-    rng = np.random.default_rng(0)
+def test_messages_of_livox_own_type_are_read_with_the_times_of_their_points(opened, package, rng):
     xyz = rng.uniform(-20, 20, (500, 3)).astype(np.float32)
     recorded = [
         ("/livox/lidar", f"{package}/msg/CustomMsg", BEGAN_S + k / 10, messages.livox(BEGAN_S + k / 10, xyz, package))

@@ -53,8 +53,7 @@ def test_what_is_silent_or_missing_is_listed(tmp_path, good, options, broken):
     assert [what.split(":")[0][: len(name)] for what, name in zip(found, broken, strict=True)] == broken
 
 
-def test_a_pair_overlaps_and_has_one_fault_of_the_network_at_most():
-    rng = np.random.default_rng(0)
+def test_a_pair_overlaps_and_has_one_fault_of_the_network_at_most(rng):
     for _ in range(200):
         one, other = live_fault_pairs.drawn(rng)
         assert one.begin < other.begin < one.end <= other.end

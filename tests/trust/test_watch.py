@@ -206,11 +206,10 @@ def test_a_fault_that_ends_while_every_third_sweep_is_processed_is_withdrawn(nam
     assert trusts[-1].level == TrustLevel.GOOD
 
 
-def test_a_knock_under_a_cover_is_reported_when_the_cover_is_gone():
+def test_a_knock_under_a_cover_is_reported_when_the_cover_is_gone(rng):
     """The sensor stands: the sweeps before and after the cover show one place."""
     watch = TrustWatch(load(SENSOR).sensor)
     frame = drive("street")[0]
-    rng = np.random.default_rng(0)
     keys = []
     for k in range(100):
         noise = 1 + rng.normal(0, 1e-3, (len(frame.points), 1))

@@ -156,9 +156,8 @@ def test_overtaken_and_doubled_packets_change_nothing(maker):
     assert set(reception.refused) <= {"late or twice"}
 
 
-def test_garbage_and_foreign_packets_are_counted_and_change_nothing(maker, caplog):
+def test_garbage_and_foreign_packets_are_counted_and_change_nothing(maker, caplog, rng):
     timed = maker.timed()
-    rng = np.random.default_rng(0)
     dirty = list[Timed]()
     n = 0
     whole, _ = decoded(maker.decoder(), timed)

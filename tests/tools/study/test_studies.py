@@ -66,8 +66,7 @@ def random_track(rng, n, scale):
     return BodyTrack("pedestrian, moving", x, P, pose)
 
 
-def test_errors_are_consistent_only_at_the_scale_of_their_covariance():
-    rng = np.random.default_rng(0)
+def test_errors_are_consistent_only_at_the_scale_of_their_covariance(rng):
     for scale, fits in ((1.0, True), (1.6, False), (0.5, False)):
         found = study([random_track(rng, 60, scale) for _ in range(80)])["pedestrian, moving"]
         for part in found.values():

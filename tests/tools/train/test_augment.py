@@ -31,8 +31,7 @@ def test_augmentation_keeps_every_crop_and_enough_points(counts, seed):
     assert np.isfinite(seen.xyz).all()
 
 
-def test_no_augmented_crop_is_finer_than_its_sensor():
-    rng = np.random.default_rng(0)
+def test_no_augmented_crop_is_finer_than_its_sensor(rng):
     azimuth, elevation = np.meshgrid(np.arange(-3, 3, 0.1), np.arange(-4.9, 0, 0.5))  # ten beams
     a = np.deg2rad(azimuth.ravel())
     e = np.deg2rad(elevation.ravel())

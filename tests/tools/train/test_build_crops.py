@@ -46,8 +46,7 @@ def test_detectable_objects_are_known_outside_the_annotated_region():
     assert labels.unknown.tolist() == [False, True]
 
 
-def test_a_pasted_object_stands_on_the_ground_and_occludes_the_scene():
-    rng = np.random.default_rng(0)
+def test_a_pasted_object_stands_on_the_ground_and_occludes_the_scene(rng):
     azimuth, elevation = np.meshgrid(np.arange(-180, 180, 0.4), np.arange(-24, -1, 0.8))
     rho = 1.7 / np.tan(np.deg2rad(-elevation.ravel()))
     a = np.deg2rad(azimuth.ravel())

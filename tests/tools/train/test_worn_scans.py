@@ -15,8 +15,7 @@ def test_a_sweep_is_the_same_whenever_it_is_made():
     assert_same(first, second)
 
 
-def test_some_beams_are_dead_and_every_second_one_of_a_thinned_sensor():
-    rng = np.random.default_rng(0)
+def test_some_beams_are_dead_and_every_second_one_of_a_thinned_sensor(rng):
     dead = [worn_scans.dead_beams(rng, SENSORS["vlp-16"]) for _ in range(400)]
     numbers = np.array([len(rows) for rows in dead])
     assert set(numbers.tolist()) == {0, 1, 2, 3, 8}
