@@ -72,7 +72,11 @@ class ReturnsCheck:
             return None
         least = MIN_POINTS * samples[-1].weight
         count = self._count(samples[-1])
-        return self._lost_sectors(samples, least) or self._dead_bands(samples) or self._thinned(count, least)
+        # Each check runs in every look, since it keeps what it has found.
+        sectors = self._lost_sectors(samples, least)
+        bands = self._dead_bands(samples)
+        everywhere = self._thinned(count, least)
+        return sectors or bands or everywhere
 
     @property
     def n_dead(self) -> int:
