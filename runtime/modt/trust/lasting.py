@@ -89,9 +89,10 @@ class BeamHistory:
 class SectorHistory:
     """Narrow sectors in which there are no returns at all.
 
-    A view that is blocked ends from one look to the next. One that ends slowly ends at a crest. Beside a wall that is
-    nearer than the sensor sees there are its parts farther away, and for a sensor that sees nothing within metres
-    anything may stand there. A sector that never had a return is blocked as well, unless the profile knows of it.
+    A view that is blocked ends from one look to the next. One that ends slowly ends at a crest. A wall closer than
+    the minimum range also leaves a dark sector, but its farther parts return beside it, so such a sector is not
+    blocked. Sensors with a long minimum range are not judged by lost returns, since anything may stand within it. A
+    sector that never had a return is blocked as well, unless the profile knows of it.
 
     Args:
         sensor: its blind sectors.

@@ -52,7 +52,8 @@ class ReturnsCheck:
         self._counted: list[tuple[Sample, Float64]] = []  # the last counts, and of what
         self._lost: Bool = np.zeros(SECTORS, np.bool_)
         self._dead: Bool = np.zeros(BANDS, np.bool_)
-        self.gained = False  # nearly all cells had more returns than usual at the last look that judged all of them
+        # Whether four fifths of the cells had more returns than usual, at the last look that could judge it.
+        self.gained = False
 
     def learn(self, sample: Sample, elapsed_s: float) -> None:
         """Follow the returns of a sweep."""
@@ -80,13 +81,14 @@ class ReturnsCheck:
 
     @property
     def n_dead(self) -> int:
-        """Number of bands without returns, at the last look."""
+        """Number of bands that are dead at the last look: their returns ended at once, and are not back."""
         return int(np.count_nonzero(self._dead))
 
     def _lost_sectors(self, samples: Sequence[Sample], least: float) -> Loss | None:
         """Sectors with hardly a return, of those that usually have at least some.
 
-        A part of the view has to end at once: beside a wall that is too near, or over a crest, it ends slowly.
+        A part of the view has to end at once: beside a wall that is too near, or over a crest, it ends slowly. A
+        sector that ended at once counts until its returns are back. If the view is blind, all lost sectors count.
         """
         tuning = self._tuning
         usual = self._usual.sum(axis=1)
@@ -95,8 +97,9 @@ class ReturnsCheck:
         n_expected = int(np.count_nonzero(expected))
         n_lost = int(np.count_nonzero(lost))
         blind = n_lost >= tuning.blind_share * max(n_expected, 1)
-        enough = n_lost >= tuning.degraded_sectors  # few that are lost are none, whether they ended at once or not
-        self._lost = lost & (self._lost | self._ended(samples, usual, lost, 1) if enough else self._lost)
+        if n_lost >= tuning.degraded_sectors:  # fewer are not reported, whether they ended at once or not
+            self._lost |= self._ended(samples, usual, lost, 1)
+        self._lost &= lost
         if not blind:  # a view that is lost is reported however slowly it ended
             lost = self._lost
             n_lost = int(np.count_nonzero(lost))
@@ -106,7 +109,7 @@ class ReturnsCheck:
         return Loss(blind, f"no returns from {where} ({360 // SECTORS * n_lost} deg)")
 
     def _dead_bands(self, samples: Sequence[Sample]) -> Loss | None:
-        """Bands whose returns ended at once, and are gone all around."""
+        """Bands whose returns ended at once, and are gone all around. A band counts until its returns are back."""
         weight = samples[-1].weight
         usual = self._usual.sum(axis=0)
         around = (self._usual > weight).sum(axis=0) >= AROUND
@@ -122,17 +125,19 @@ class ReturnsCheck:
     def _ended(self, samples: Sequence[Sample], usual: Float64, missing: Bool, axis: int) -> Bool:
         """(n,) whether the returns of each sector or band ended at once, within one of the sweeps.
 
-        Only those that are `missing` (n,) count. If all of them were already in the first sweep, none is looked for.
+        The result is not limited to those that are `missing` (n,), so callers do it. It is False for all if none of
+        the missing ones was whole in the first sweep.
         """
         whole = self._tuning.whole_share * usual
         if not (missing & (self._count(samples[0]).sum(axis=axis) > whole)).any():
             return np.zeros(len(usual), np.bool_)
         count = np.array([self._count(sample).sum(axis=axis) for sample in samples])
+        # Two sweeps: a loss begins within one, which still has some of the returns.
         least_of_two = np.minimum(count[1:], np.concatenate([count[2:], count[-1:]]))
         return np.asarray(((count[:-1] > whole) & (least_of_two < self._tuning.lost_share * usual)).any(axis=0))
 
     def _thinned(self, count: Float64, least: float) -> Loss | None:
-        """Returns that are missing everywhere alike."""
+        """Returns that are missing everywhere alike. Sets `gained` if enough cells can be judged."""
         in_thirds = SECTORS, THIRDS, BANDS // THIRDS
         usual = self._usual.reshape(in_thirds).sum(axis=2)
         full = usual > 2 * least

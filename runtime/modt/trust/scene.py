@@ -27,7 +27,8 @@ RANGES = 50
 MIN_POINTS = 40
 """Fewest obstacle points in which a scene is compared."""
 LEAST_SEEN = 0.75
-"""Share of the obstacle points that a turn brings into view of the sweep before at least."""
+"""Hits of a turn are divided by the number of obstacle points that it brings into sectors seen by the earlier sweep,
+and at least by this share of all obstacle points."""
 TURN_TOLERANCE = 2
 """Bearings by which a scene may be turned and count as unchanged."""
 SCALE_TOLERANCE = 1
