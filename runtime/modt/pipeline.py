@@ -8,11 +8,9 @@ from typing import Protocol
 
 import numpy as np
 
-from modt.classification.decision import LikeliestClass
 from modt.classification.scheduler import Scheduler
 from modt.energy.ledger import STAGES as LEDGER_STAGES
 from modt.energy.ledger import Ledger
-from modt.object_box.estimator import SeenBoxes
 from modt.observations import Located, StaticTracks
 from modt.placement import Placement
 from modt.sensor_fit.levelling import Leveller
@@ -20,6 +18,7 @@ from modt.types import (
     UNLIMITED,
     Bool,
     Budget,
+    Decisions,
     Evidence,
     Float32,
     Float64,
@@ -27,6 +26,7 @@ from modt.types import (
     FrameResult,
     Int,
     Motion,
+    ObjectBoxes,
     Proposals,
     TrackedFrame,
     Tracks,
@@ -106,20 +106,20 @@ class TrackingStage(Protocol):
         """Name of each value of tracks.state."""
 
     def static_tracks(self, stamp_s: float) -> StaticTracks:
-        """Tracks that a frame at this time may continue, as the odometry needs them."""
+        """Tracks that a frame at this time may continue, as the odometry needs them; deletes those ended by a gap."""
 
     def track(self, stamp_s: float, proposals: Proposals, located: Located, points: Float32) -> TrackedFrame:
         """Predict, associate and update; afterwards every proposal belongs to one track."""
 
     def confirm(self, rows: Int, confirmed: Bool) -> Tracks:
-        """Lead the classified rows (R,) to their next states, by whether the class is confirmed; a snapshot."""
+        """Advance the states of the classified rows (R,), and return a snapshot of all tracks."""
 
 
 class ClassificationStage(Protocol):
-    """Points to class likelihoods."""
+    """Points to class probabilities."""
 
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
-        """(R, C) P(Y|X) of the proposals named."""
+        """(R, C) P(class | points) of the proposals named, under the class frequency that the classifier assumes."""
 
     def facts(self) -> dict[str, str]:
         """Name and hash of the model, for the record of a run."""
@@ -134,8 +134,27 @@ class FusionStage(Protocol):
     def asks(self, evidence: Evidence, motion: Motion, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks whose view of this frame is worth a classification."""
 
-    def fuse(self, evidence: Evidence, motion: Motion, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
-        """Write the views (R, C) of the rows (R,) and their posteriors; returns (R,) whether each is confirmed."""
+    def fuse(self, evidence: Evidence, motion: Motion, proposals: Proposals, rows: Int, probability: Float64) -> Bool:
+        """Add the class probabilities (R, C) of the rows (R,) to their posteriors; returns (R,) those confirmed."""
+
+
+class DecisionStage(Protocol):
+    """Posteriors to reported classes."""
+
+    frequency: Float64
+    """(C,) frequencies of the classes among the proposals, as estimated so far."""
+
+    def decide(self, decisions: Decisions, evidence: Evidence, motion: Motion) -> None:
+        """Write the reported class of every track."""
+
+
+class BoxStage(Protocol):
+    """Boxes of proposals to boxes of whole objects."""
+
+    def estimate(
+        self, own: ObjectBoxes, motion: Motion, decisions: Decisions, proposals: Proposals, placement: Placement
+    ) -> None:
+        """Write the whole box of every track."""
 
 
 @dataclass(frozen=True)
@@ -148,12 +167,12 @@ class Pipeline:
     fusion: FusionStage
     scheduler: Scheduler
     classifier: ClassificationStage
-    decision: LikeliestClass
-    boxes: SeenBoxes
+    decision: DecisionStage
+    boxes: BoxStage
     ledger: Ledger
 
     def step(self, frame: Frame, budget: Budget = UNLIMITED) -> FrameResult:
-        """Process a frame within a budget of classifications (Figs. 2 and 5)."""
+        """Process a frame within a budget of classifications (Figs. 2 and 5 of the paper)."""
         run = self.ledger.run
         frame = self.view.level(frame)
         proposals = run(SEGMENTATION, self.view.segment, frame)
@@ -168,8 +187,8 @@ class Pipeline:
         rows = chosen.rows
         confirmed = _NONE_CONFIRMED
         if len(rows):
-            likelihood = self._classify(frame.points, proposals, motion.proposal[rows], budget)
-            confirmed = run(FUSION, self.fusion.fuse, tracked.own_evidence, motion, proposals, rows, likelihood)
+            probability = self._classify(frame.points, proposals, motion.proposal[rows], budget)
+            confirmed = run(FUSION, self.fusion.fuse, tracked.own_evidence, motion, proposals, rows, probability)
         run(FUSION, self.decision.decide, tracked.decisions, evidence, motion)
         run(TRACKING, self.boxes.estimate, tracked.boxes, motion, tracked.decisions, proposals, located.placement)
         # Last, since it takes the snapshot of all columns, the reported class among them.
@@ -178,6 +197,7 @@ class Pipeline:
         result = FrameResult(
             frame=frame,
             T_world_sensor=placement.T_world_sensor,
+            # The boxes until here are as seen during the sweep. The result has them as they are at its stamp.
             proposals=replace(proposals, box=placement.at_stamp(proposals.centroid, proposals.box)),
             tracks=tracks,
             state_names=self.tracker.state_names,
@@ -187,12 +207,12 @@ class Pipeline:
         return self.view.finish(result, placement)
 
     def _classify(self, points: Float32, proposals: Proposals, which: Int, budget: Budget) -> Float64:
-        """(R, C) likelihoods. The ledger counts the points; the scheduler learns the cost where time is limited."""
+        """(R, C) class probabilities. The ledger counts points; the scheduler learns the cost if time is limited."""
         cost = self.scheduler.cost
         count = proposals.count[which]
         classify = self.classifier.classify
-        likelihood, cpu_ns = self.ledger.timed(CLASSIFICATION, classify, points, proposals, which)
+        probability, cpu_ns = self.ledger.timed(CLASSIFICATION, classify, points, proposals, which)
         self.ledger.count(CLASSIFICATION, points=cost.size(count))
         if budget.cpu_ms is not None or budget.mean_ms is not None:
             self.scheduler.record_cost(count, cpu_ns / 1e6)
-        return likelihood
+        return probability

@@ -1,7 +1,7 @@
 """Selection of views and fusion of all that is known of a track (section V-C): one `pipeline.FusionStage` a mode.
 
 `observe` adds the boxes and the motion of a frame to the evidence of the tracks. `asks` selects the tracks whose view
-is worth a classification. `fuse` adds the classifier's likelihoods and returns which classes are confirmed. The
+is worth a classification. `fuse` adds the classifier's probabilities and returns which classes are confirmed. The
 tracker passes the result to the state machine. `observe` and `fuse` write the evidence in place.
 
 The posterior of a track after t frames, with views Y, boxes B and motion M, is
@@ -95,7 +95,7 @@ class Confirmation:
 
 
 class EveryFrame:
-    """Tracking by detection: every proposal is classified, its likelihood is the posterior (Fig. 2a)."""
+    """Tracking by detection: every proposal is classified, and its class probability is the posterior (Fig. 2a)."""
 
     def observe(self, evidence: Evidence, motion: Motion, proposals: Proposals) -> None:
         """Do nothing: views alone count."""
@@ -104,9 +104,9 @@ class EveryFrame:
         """(M,) tracks with a proposal."""
         return motion.observed
 
-    def fuse(self, evidence: Evidence, motion: Motion, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
+    def fuse(self, evidence: Evidence, motion: Motion, proposals: Proposals, rows: Int, probability: Float64) -> Bool:
         """Replace the posterior; every class is confirmed."""
-        evidence.posterior[rows] = normalise(likelihood)
+        evidence.posterior[rows] = normalise(probability)
         evidence.views[rows] = 1
         evidence.key_points[rows] = proposals.count[motion.proposal[rows]]
         return np.ones(len(rows), np.bool_)
@@ -154,17 +154,17 @@ class FusedTracks:
         evidence.may_be_object[rows] = self._may_be_object((weighted / weighted.sum(axis=0)).T)
         evidence.posterior[rows] = self._posterior(evidence, rows, prior, box_evidence, motion_evidence).T
 
-    def fuse(self, evidence: Evidence, motion: Motion, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
+    def fuse(self, evidence: Evidence, motion: Motion, proposals: Proposals, rows: Int, probability: Float64) -> Bool:
         """Add a view to what is known of the rows (R,); returns (R,) whether the class is confirmed now.
 
-        The likelihood (R, C) of the classifier is a posterior under the class frequency and, by its pool weight, the
-        box prior: both are divided out.
+        The classifier's `probability` (R, C) is P(class | points) under the class frequency, times the box's odds of
+        an object if the classifier pooled them (`pool_weight`). Both are divided out.
         """
         points = proposals.count[motion.proposal[rows]]
         prior = evidence.prior.take(rows, axis=0)
         assumed = pooled_prior(_log(prior), self._log_frequency, self._prior.pool_weight(proposals))
-        view = np.log(normalise(likelihood)) - assumed
-        # Few points of what stands still tell little. Of what moves, the motion tells more.
+        view = np.log(normalise(probability)) - assumed
+        # A view of few points tells little. Only tracks that are known to be still have it weakened for that.
         is_still = motion.motion[rows] == MotionState.STILL.value
         view *= np.where(is_still, np.minimum(1.0, points / self._weights.full_points), 1.0)[:, None]
         mean = evidence.view_evidence.take(rows, axis=0)
@@ -270,7 +270,7 @@ class FurtherViews(FusedTracks):
         may_be_object = evidence.may_be_object[rows] | (many_points & self._may_be_object(evidence.prior[rows]))
         may_be_object |= self._may_be_near_person(proposals)[proposal_of_row]
         first = may_be_object | (many_points & self._is_near_and_lasting(motion, proposals, rows))
-        # Views of a confirmed class: of an object at growing intervals, of background with far more points.
+        # Views of a confirmed class: of an object at growing intervals, of any class with far more points.
         review = (background < 0.5) & (age >= conditions.review_age_ratio * key_age + conditions.review_frames)
         review |= may_be_object & self._shows_more(evidence, motion, rows, conditions.far_more_points_ratio)
         # Views of an unconfirmed one: at shorter intervals, with more points, of a possible person every few frames.
@@ -285,7 +285,7 @@ class FurtherViews(FusedTracks):
         return asks
 
     def _is_near_and_lasting(self, motion: Motion, proposals: Proposals, rows: Int) -> Bool:
-        """(R,) tracks that are near and seen in some frames."""
+        """(R,) tracks that are nearer than `unseen_m` and were seen in `unseen_hits` frames."""
         conditions = self._conditions
         x, y = proposals.box[motion.proposal[rows], :2].T
         is_near: Bool = x * x + y * y < conditions.unseen_m**2

@@ -23,9 +23,9 @@ class AnyView:
         """(M,) tracks never viewed."""
         return wants_class & ~evidence.viewed
 
-    def fuse(self, evidence: Evidence, motion: Motion, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
+    def fuse(self, evidence: Evidence, motion: Motion, proposals: Proposals, rows: Int, probability: Float64) -> Bool:
         """Multiply the view into the posterior; every class is confirmed."""
-        posterior = from_log_weights((evidence.view_evidence[rows] + np.log(normalise(likelihood))).T).T
+        posterior = from_log_weights((evidence.view_evidence[rows] + np.log(normalise(probability))).T).T
         evidence.posterior[rows] = posterior
         evidence.view_evidence[rows] = np.log(posterior) - self._log_frequency
         evidence.views[rows] += 1
@@ -57,13 +57,13 @@ class KeyViews(AnyView):
         asks[rows] = ~evidence.viewed[rows] | (independent & (motion.age[rows] >= self._start_frame))
         return asks
 
-    def fuse(self, evidence: Evidence, motion: Motion, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
+    def fuse(self, evidence: Evidence, motion: Motion, proposals: Proposals, rows: Int, probability: Float64) -> Bool:
         """Multiply the view into the posterior (Equation 6); returns (R,) whether the class is confirmed now.
 
         A view before the start frame is not counted, and the next one replaces it.
         """
         evidence.view_evidence[rows[evidence.views[rows] == 0]] = 0.0
-        super().fuse(evidence, motion, proposals, rows, likelihood)
+        super().fuse(evidence, motion, proposals, rows, probability)
         started: Bool = motion.age[rows] >= self._start_frame
         evidence.views[rows] -= ~started
         return self._is_confirmed(evidence.posterior[rows].T) & started

@@ -108,7 +108,7 @@ class RequestTuning:
     Chosen on: judgement.
     """
     far_more_points_ratio: float = 2.0
-    """Confirmed background that may be an object is classified again at this multiple of the points of its last view.
+    """A confirmed track that may be an object is classified again at this multiple of the points of its last view.
 
     Chosen on: 48 simulated drives of six sensors (seeds 1000 to 1003).
     """
