@@ -201,7 +201,7 @@ class Pipeline:
             proposals=replace(proposals, box=placement.at_stamp(proposals.centroid, proposals.box)),
             tracks=tracks,
             state_names=self.tracker.state_names,
-            n_deferred=chosen.deferred,
+            n_deferred=chosen.n_deferred,
             classified=tracks.id[rows],
         )
         return self.view.finish(result, placement)

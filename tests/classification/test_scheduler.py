@@ -58,7 +58,7 @@ def test_without_a_budget_all_are_served_by_decreasing_worth():
     tracks.waiting[2] = 3
     chosen = Scheduler(cost_model()).select(tracks, tracks, tracks, proposals, np.ones(3, np.bool_), UNLIMITED)
     assert chosen.rows.tolist() == [2, 0, 1]
-    assert chosen.deferred == 0
+    assert chosen.n_deferred == 0
 
 
 def test_waiting_counts_deferred_frames():
@@ -69,7 +69,7 @@ def test_waiting_counts_deferred_frames():
     chosen = Scheduler(cost_model()).select(
         tracks, tracks, tracks, proposals, np.array([True, False, True]), Budget(calls=0)
     )
-    assert chosen.deferred == 1
+    assert chosen.n_deferred == 1
     assert tracks.waiting.tolist() == [6, 0, 5]
 
 

@@ -61,7 +61,7 @@ class Watched:
         points = proposals.count[motion.proposal[chosen.rows]]
         assert len(set(chosen.rows.tolist())) == len(chosen.rows)
         assert asks[chosen.rows].all()
-        assert len(chosen.rows) + chosen.deferred == np.count_nonzero(asks & motion.observed)
+        assert len(chosen.rows) + chosen.n_deferred == np.count_nonzero(asks & motion.observed)
         assert budget.calls is None or len(chosen.rows) <= budget.calls
         if budget.cpu_ms is not None and len(points):
             assert self.cost.cost_ms(points) <= budget.cpu_ms or (self.cost.outdated and len(points) == 1)

@@ -18,7 +18,7 @@ class Selection:
     """Decision of the scheduler."""
 
     rows: Int  # tracks to classify now, by decreasing worth
-    deferred: int  # number of tracks that requested a class and have to wait
+    n_deferred: int  # tracks that requested a class and have to wait
 
 
 class Savings:
@@ -107,7 +107,7 @@ class Scheduler:
             motion: the tracks alive.
             evidence: their classes, as known so far.
             proposals: proposals of this frame.
-            asks: (M,) tracks that request a class, each with a proposal.
+            asks: (M,) tracks that request a class. Those without a proposal are left out.
             budget: budget of the frame.
         """
         observed = motion.observed
