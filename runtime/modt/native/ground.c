@@ -8,8 +8,8 @@
  *   5. smooth          medians across the rays: the ground under a vehicle is that beside it
  *   6. keep_points     points within bounds, with their heights, and low points that may belong to something
  *   7. append_low      those after the others
- * Before 3, measure_roughness tells how far above the ground a return is clear of it, and reach_across raises the
- * highest returns below gaps of dead beams.
+ * Before 3, measure_roughness tells how far above the ground a return is clear of it. Then reach_across raises the
+ * highest returns below gaps of dead beams, and cells far away take the highest return of the next ring too (_tops).
  * Passes 1, 2 and 6 go by blocks of points that stay in the first-level cache. A value a cell stands at
  * ring * sectors + sector; the cell after the last stands for the points out of bounds of range.
  */
@@ -36,13 +36,13 @@ enum { POSITIONS = 1024 }; /* of a lowest return in its ring, in the last bits o
 
 /* What a point is compared with: the surface at the inner and the outer edge of its ring, and heights above it from
  * which the point is a foot, and clear of the ground. */
-typedef enum { INNER, OUTER, FOOT, CLEAR, BELOW } Below;
+typedef enum { INNER, OUTER, FOOT, CLEAR, N_LEVELS } Level;
 
 /* Scratch: a value a cell, a value a ray, and a value a point. */
 typedef struct {
     float *lowest, *surface, *range_before; /* (cells,) range_before: of the ground cell before each cell [m] */
     float *clear;                           /* (cells,) height from which a return is clear of the ground */
-    u4 *below;                              /* (cells,) Below of the points of each cell */
+    u4 *below;                              /* (cells,) Levels of the points of each cell */
     float (*ends)[2];                       /* (cells,) lowest return, and the highest, negated, side by side */
     uint8_t *kind;                          /* (cells,) flags of Kind */
     float *rays;                            /* (7 * sectors,) */
@@ -246,9 +246,9 @@ static void close_round(const void *row, i64 step, i64 size, void *round)
 typedef enum { MAY_JOIN = 1, MAY_HIDE = 2 } Beside;
 
 /* The first half of Rays.advance for one ring, behind which are the ends `behind`: cells that continue the ground of
- * their own rays, and cells in which something stands. `surface` holds the lowest return behind each cell.
- * Height and range of the ground cell before the ring are left in it and in `range_before`, the height of cells that
- * are surely ground in `sure`. Something stands in a cell if its highest return lies flat_m above the lowest, and more
+ * their own rays, and cells in which something stands. `surface`: in, lowest return behind each cell; out, height of
+ * the ground cell before it. The range of that cell is written to `range_before`, the height of cells that are surely
+ * ground to `sure`. Something stands in a cell if its highest return lies flat_m above the lowest, and more
  * on ground that rises. */
 static void follow_rays(const Ground *g, i32 ring, float (*restrict ends)[2], float (*restrict behind)[2],
                         float *restrict lowest, uint8_t *restrict kind, const float *restrict height,
@@ -275,8 +275,8 @@ static void follow_rays(const Ground *g, i32 ring, float (*restrict ends)[2], fl
         surface[k] = height[k];
         range_before[k] = range[k];
         sure[k] = found & (is_flat | (is_below == 0)) ? lowest[k] : NAN;
-        may[k] = (uint8_t)((is_flat & (residual < gap * c.hill_slope)) | (stands & is_below & (gap > c.near_m)) << 1); /* Beside */
-        kind[k] = (uint8_t)(found | stands << 3); /* GROUND, STANDS */
+        may[k] = (uint8_t)((is_flat & (residual < gap * c.hill_slope)) * MAY_JOIN | (stands & is_below & (gap > c.near_m)) * MAY_HIDE);
+        kind[k] = (uint8_t)(found * GROUND | stands * STANDS);
     }
 }
 
@@ -291,7 +291,7 @@ static void join_rays(const Ground *g, i32 ring, const float *restrict beside, c
         float here = lowest[k], range_m = range_of(here, (float)ring, c.ring_step);
         float max_rise_m = range_m * c.max_rise_beside;
         int continues = (magnitude(here - beside[k]) < max_rise_m) | (magnitude(here - beside[k + 2]) < max_rise_m);
-        int found = (kind[k] & GROUND) | (may[k] & continues);
+        int found = ((kind[k] & GROUND) | (may[k] & (continues * MAY_JOIN))) != 0;
         here = may[k] & (continues ? 0 : MAY_HIDE) ? lowered(here, c.hidden_m) : here;
         float gap = range_m - range[k];
         float newest = slope[k] + (here - height[k] - slope[k] * gap) / (gap + c.slope_length_m);
@@ -300,7 +300,7 @@ static void join_rays(const Ground *g, i32 ring, const float *restrict beside, c
         height[k] = found ? here : height[k];
         range[k] = found ? range_m : range[k];
         slope[k] = found ? newest : slope[k];
-        kind[k] = (uint8_t)(kind[k] | found | (magnitude(slope[k]) > c.ramp_slope) << 1); /* GROUND, STEEP */
+        kind[k] = (uint8_t)(kind[k] | found * GROUND | (magnitude(slope[k]) > c.ramp_slope) * STEEP);
     }
 }
 
@@ -345,7 +345,7 @@ static void trace(const Ground *g, float height_m, const GroundScratch *s)
         close_round(kind, flank, sectors, round);
         for (i32 k = 0; k < sectors; k++) {
             i32 steep = (round[k] | round[k + flank] | round[k + 2 * flank]) & STEEP;
-            kind[k] = (uint8_t)(kind[k] | steep << 1); /* RAMP */
+            kind[k] = (uint8_t)(kind[k] | (steep ? RAMP : 0));
             rise_range_m[k] = steep ? max_gap_m : near_m;
         }
     }
@@ -444,7 +444,7 @@ static i64 keep_points(const Ground *g, const GroundScratch *s, const u4 *points
     const i32 *cell = s->cell + start, bits = __builtin_ctz((unsigned)g->sectors);
     float *const *kept = out->kept;
     int8_t *kind = out->kind + start;
-    float below[BELOW][BLOCK], height[BLOCK], low = g->min_height_m, high = g->max_height_m;
+    float below[N_LEVELS][BLOCK], height[BLOCK], low = g->min_height_m, high = g->max_height_m;
     uint8_t is_kept[BLOCK + GROUP] = {0}, is_low[BLOCK + GROUP] = {0}, is_clear[BLOCK];
     /* 1. The surface of the cell of each point, by columns. */
     for (i64 i = 0; i < BLOCK; i += 4) {
@@ -452,7 +452,7 @@ static i64 keep_points(const Ground *g, const GroundScratch *s, const u4 *points
         for (int k = 0; k < 4; k++)
             of_point[k] = s->below[cell[i + k]];
         transpose(of_point, column);
-        for (int v = 0; v < BELOW; v++)
+        for (int v = 0; v < N_LEVELS; v++)
             *(u4 *)(below[v] + i) = column[v];
     }
     /* 2. Heights, and from them the kinds. An infinite surface gives a height of -infinity: out of range. */
@@ -533,7 +533,8 @@ EXPORT void modt_above_ground(const Ground *g, const u4 *points, i64 n, float he
     }
     measure_roughness(g, s, out->top);
     reach_across(g, s, n);
-    for (i64 k = (i64)g->bonnet_ring * g->sectors; k < cells - g->sectors; k++) /* far away, right behind it */
+    /* GroundEstimator._tops, in place; ascending, so that each cell reads a ring that is not yet raised. */
+    for (i64 k = (i64)g->bonnet_ring * g->sectors; k < cells - g->sectors; k++)
         s->ends[k][1] = minf(s->ends[k][1], s->ends[k + g->sectors][1]);
     trace(g, height_m, s);
     interpolate(g, s);

@@ -80,12 +80,13 @@ class GroundEstimator:
 
     The lowest return of a cell is ground if it continues the ground of its ray. It may rise by `max_slope_deg` more
     than the running slope of the ray over a short way, on and beside a ramp over a longer one. It may not rise more
-    where something stands in the cell or, far away or on a ray that has met no ground yet, right behind it, since it
-    may be a flank or a bumper. Nor may it rise on such a ray unless it goes on: where no return is right behind, or
-    one that lies lower again, the cell may be the side or the top of something low. The ground may fall by
-    `max_slope_deg` more over any gap, since only ground lies lower. A ray that has lost the ground finds it again in
-    a cell where nothing stands, if that is as high as ground on a ray beside it. The surface is linear between the
-    ground returns of a ray; beyond its last one, the ground is level, but a ramp goes on for `max_gap_m`.
+    where something stands in the cell, since it may be a flank or a bumper. Far away, and on a ray that has met no
+    ground yet, the next ring counts as well. Nor may it rise on such a ray unless it goes on: where the next
+    `rings_behind` rings have no return, or one that lies lower again, the cell may be the side or the top of
+    something low. Beyond `low_range_m` such a ray does not rise at all. The ground may fall by `max_slope_deg` more
+    over any gap, since only ground lies lower. A ray that has lost the ground finds it again in a cell where nothing
+    stands, if that is as high as ground on a ray beside it. The surface is linear between the ground returns of a
+    ray; beyond its last one, the ground is level, but a ramp goes on for `max_gap_m`.
 
     Behind a crest or an edge, the foot of what stands there is hidden. Where something stands more than `near_m` from
     the last ground, and the lowest return of its cell is below the line of the ray, the ground is taken to be
@@ -134,10 +135,13 @@ class GroundEstimator:
         return self.heights(points, sensor_height_m)[0]
 
     def heights(self, points: PointColumns, sensor_height_m: float) -> tuple[Float32, Float32, Float32]:
-        """(N,) height of each point above the ground, and (N,) height there from which it is clear of it [m].
+        """Heights of the points, heights from which they are clear of the ground, and highest returns.
 
-        The latter is infinite in a cell in which no return is. With them comes the (rings, SECTORS) highest return of
-        each cell [m, sensor frame], minus infinity without any.
+        Returns:
+            (N,) height of each point above the ground [m].
+            (N,) height above ground from which a return in this cell is surely not ground [m]. It is infinite if the
+            cell has no such return, or lies beyond `low_range_m`.
+            (rings, SECTORS) highest return of each cell [m, sensor frame], minus infinity without any.
         """
         cell = self.grid.cell(points)
         lowest = self._lowest(points, cell, sensor_height_m)
@@ -230,7 +234,7 @@ class GroundEstimator:
         return standing
 
     def _tops(self, highest: Float32) -> Float32:
-        """(rings, SECTORS) highest return in each cell or, far away, right behind it [m]."""
+        """(rings, SECTORS) highest return in each cell and, far away, in the next ring [m]."""
         tops = highest.copy()
         far = self.bonnet_ring
         tops[far:-1] = np.maximum(highest[far:-1], highest[far + 1 :])
@@ -249,12 +253,16 @@ class GroundEstimator:
         for ring in range(self.grid.rings):
             flat_m = self.flat_m[ring] + np.maximum(rays.slope, 0) * self.depth_m[ring]
             behind = min(ring + 1, self.grid.rings - 1)
-            flat, flat_behind = (top[at] - lowest[ring] <= flat_m for at in (ring, behind))
+            flat = top[ring] - lowest[ring] <= flat_m
+            flat_behind = top[behind] - lowest[ring] <= flat_m
             rays.advance(ring, range_m[ring], flat, flat_behind & goes_on[ring])
         return rays
 
     def _lowest_behind(self, lowest: Float32) -> Float32:
-        """(rings, SECTORS) lowest return of the near cells right behind each on its ray [m], infinite without any."""
+        """(rings, SECTORS) lowest return in the next `rings_behind` rings of each ray [m], infinite without any.
+
+        Only rings nearer than `low_range_m` are looked at.
+        """
         lowest_behind = np.full_like(lowest, np.inf)
         near = lowest[: self.near_rings]
         for step in range(1, min(self.tuning.rings_behind, self.near_rings - 1) + 1):
@@ -291,7 +299,7 @@ class GroundEstimator:
 
 
 class Rays:
-    """Last ground cell of each of the SECTORS rays, as all of them advance ring by ring, and the cells behind them.
+    """The SECTORS rays as they advance: last ground cell of each, and what was found in the rings passed.
 
     Attributes:
         lowest: (rings, SECTORS) height of the ground of each cell in which there is a return, if it is ground [m].
@@ -317,24 +325,25 @@ class Rays:
         """(SECTORS,) slope at the last ground cell of each ray that ends on a ramp, else 0."""
         return self.slope * self.on_ramp
 
-    def advance(self, ring: int, range_m: Float32, flat: Bool, goes_on: Bool) -> None:
+    def advance(self, ring: int, range_m: Float32, flat: Bool, may_start: Bool) -> None:
         """Find the rays that have ground in the next ring.
 
         Args:
             ring: that ring.
             range_m: (SECTORS,) range of the lowest returns [m].
             flat: (SECTORS,) cells in which nothing stands: the ground does not rise in the others.
-            goes_on: (SECTORS,) cells behind which nothing stands, and the ground goes on.
+            may_start: (SECTORS,) cells where a ray without ground may rise: nothing stands in the next ring, and the
+                ground goes on.
         """
         tuning = self.ground.tuning
-        lowest = self.lowest[ring]
+        lowest = self.lowest[ring]  # a view: writes go to self.lowest, but keep the positions, and so range_m
         max_slope = self.ground.max_slope
         # How far each return is from the line that its ray was on, extrapolated no farther than max_gap_m.
         gap = range_m - self.range_m
         residual = lowest - self.height_m - self.slope * np.minimum(gap, tuning.max_gap_m)
         # It continues its own ray. Before a ray has met any ground, a rise has to go on behind as well.
         rise_range_m = np.where(self.beside_ramp, np.float32(tuning.max_gap_m), np.float32(tuning.near_m))
-        may_rise = flat & (goes_on | (self.range_m > 0))
+        may_rise = flat & (may_start | (self.range_m > 0))
         found: Bool = residual < np.minimum(gap, rise_range_m) * max_slope * may_rise + tuning.noise_m
         may_fall = residual > -(gap * max_slope + tuning.noise_m)
         found &= may_fall
