@@ -76,8 +76,8 @@ def cells(moved_m: Float64, observed_s: Float64, length_m: Float64) -> tuple[Int
 class MotionLikelihood:
     """Likelihood of motion and size under each class.
 
-    A vehicle of which both sides or one can be seen from near by shows its whole length, or its width alone. What is
-    longer than a vehicle is wide, and shorter than one is long, is a stall, a bench or a heap.
+    Seen whole from nearby, a vehicle is as long as its length, or, end-on, as its width. A length in between belongs
+    to a stall, a bench or a heap.
 
     Args:
         tuning: penalties of sizes that a class does not have.

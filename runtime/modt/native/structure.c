@@ -67,7 +67,7 @@ static int best_line(const StructureRules *rules, const double *x, const double 
                      Line *line)
 {
     enum { LANES = 8 };
-    static const i64 paired[] = {16, 3}; /* PAIRED */
+    static const i64 paired[] = {16, 3}; /* PAIRING_DIVISORS */
     float sample_x[MAX_SAMPLE + LANES], sample_y[MAX_SAMPLE + LANES];
     if (n < rules->min_cells)
         return 0;

@@ -22,11 +22,10 @@ CORRIDOR_HALF_WIDTH_M = 0.3
 def find_people(x: Float32, y: Float32, low: Float32, high: Float32, entries: Int, tuning: HeadTuning) -> Int:
     """(m,) person to whom each cell of one cluster belongs, NONE where it is nobody's.
 
-    There is nobody, or there are two or more people or posts, or one beside something higher than any person, or one
-    with something to push. That lies to one side of the person, is as high as a trolley, and ends below the
-    shoulders. A rider has a wheel on each side, which is lower. One head without any of this divides nothing, so its
-    cells are nobody's: the cluster is then one object. A post has no shoulders. It leaves like a person, but without
-    what lies around it.
+    The cluster is divided if it holds (a) two or more heads or posts, (b) one beside something higher than a person,
+    or (c) one with a load on one side. Else all cells are NONE, and the cluster is one object. A load lies to one
+    side of the person, is as high as a trolley, and ends below the shoulders. A rider has a wheel on each side, which
+    is lower. A post has no shoulders. It is separated like a person, but without what lies around it.
 
     Args:
         x: (m,) a point of each cell [m, sensor frame].

@@ -1,4 +1,4 @@
-"""Joining: the proposals of several sensors, of which an object that more than one of them sees has one.
+"""Joining: merge the proposals of several sensors, so that an object seen by several gets one proposal.
 
 Each sensor is segmented by itself, since the ground, the clusters and what rays pass follow from the order of its
 beams. Each proposal then joins the proposal of another sensor with which it shares most cells. What one sensor keeps

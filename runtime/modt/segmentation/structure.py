@@ -12,8 +12,8 @@ import numpy as np
 from modt.segmentation.tuning import StructureTuning
 from modt.types import Bool, Float32, Float64, Int
 
-PAIRED = 16, 3
-"""Each cell is paired with the one that follows after this share of the sample: a close one, and a far one."""
+PAIRING_DIVISORS = 16, 3
+"""Each cell of a sample of n is paired with the one about n / divisor after it: a close one, and a far one."""
 Line = tuple[float, float, float]
 """Cosine and sine of the normal, and distance of the sensor along it [m]."""
 
@@ -41,7 +41,8 @@ def find_surfaces(x: Float64, y: Float64, width_m: Float64, tuning: StructureTun
         off_m = x * cosine + y * sine - distance_m
         along_m = y * cosine - x * sine
         near = rest[np.abs(off_m[rest]) < tuning.thickness_m]
-        # A cell is longer along the ray than across it.
+        # A cell of the square root of range is twice as long along the ray as across it. along_m / range_m is the
+        # cosine between the line and the ray.
         length_m = width_m * (1 + np.abs(along_m) / range_m)
         run = _long_runs(along_m[near], length_m[near], near, tuning)
         if not len(run):
@@ -62,8 +63,8 @@ def _best_line(x: Float64, y: Float64, tuning: StructureTuning) -> Line | None:
     sample_y = y[::stride].astype(np.float32)
     best: Line | None = None
     most = 0
-    for share in PAIRED:
-        lines, near = _lines_through_pairs(sample_x, sample_y, len(sample_x) // share + 1, tuning)
+    for divisor in PAIRING_DIVISORS:
+        lines, near = _lines_through_pairs(sample_x, sample_y, len(sample_x) // divisor + 1, tuning)
         if near.max(initial=0) > most:
             most = int(near.max())
             cosine, sine, distance_m = lines[:, near.argmax()].tolist()
@@ -132,6 +133,8 @@ def _long_runs(along_m: Float64, length_m: Float64, cells: Int, tuning: Structur
     ends = gap_m > tuning.max_gap_m
     run_m, run = _extents(at_m, ends)
     inside = np.flatnonzero(~ends)
+    # A gap fills a run by at most two lengths of the cell before it. Below, the cell after it says whether it divides
+    # pieces. Which of both cells is taken is arbitrary, since they are about as long.
     filled_m = np.bincount(run[inside], np.minimum(gap_m, 2 * length_m[:-1])[inside], len(run_m))
     long = (run_m >= tuning.min_length_m) & (filled_m >= tuning.min_filled * run_m)
     piece_m, piece = _extents(at_m, ends | (gap_m > tuning.piece_gap * length_m[1:]))
