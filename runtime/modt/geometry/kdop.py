@@ -103,15 +103,15 @@ def overlap_shares(a: Float64, b: Float64, tuning: ShapeTuning) -> tuple[Float64
 
     Returns:
         overlap: (K,) intersection over union.
-        coverage: (K,) intersection over the smaller of the two.
+        overlap_of_smaller: (K,) intersection over the smaller of the two.
     """
     padding_m = tuning.area_padding_m
     area_a = _rectangle_areas(widths(a) + padding_m)
     area_b = _rectangle_areas(widths(b) + padding_m)
     common = _rectangle_areas(np.maximum(widths(np.minimum(a, b)) + padding_m, 0.0))
     overlap = common / (area_a + area_b - common)
-    coverage = common / np.minimum(area_a, area_b)
-    return np.minimum(*overlap), np.minimum(*coverage)
+    overlap_of_smaller = common / np.minimum(area_a, area_b)
+    return np.minimum(*overlap), np.minimum(*overlap_of_smaller)
 
 
 def _rectangle_areas(width: Float64) -> Float64:
@@ -135,7 +135,7 @@ def mahalanobis(outward: Float64, covariance: Float64, variance: float) -> tuple
     ahead = outward[:4]
     behind = -outward[4:]
     x, y = in_plane(np.where(np.abs(ahead) < np.abs(behind), ahead, behind))
-    dx = x / 2
+    dx = x / 2  # the axes count each direction twice: AXES @ AXES.T = 2 I
     dy = y / 2
     xx, xy, yy = covariance
     xx = xx + variance
@@ -207,7 +207,7 @@ def _two_cheapest(index: Int, cost: Float64, limit: float) -> tuple[Int, Float64
 def shift_between(a: Float64, b: Float64, tuning: ShapeTuning) -> Float64:
     """(K, 2) displacement from k-DOPs a to b [m], all axes weighted alike."""
     along, _, _ = shift_along_axes(a, b, tuning)
-    shift: Float64 = (AXES @ along).T / 2  # four axes a quarter turn apart in pairs: A A' = 2 I
+    shift: Float64 = (AXES @ along).T / 2  # AXES @ AXES.T = 2 I
     return shift
 
 
@@ -244,8 +244,8 @@ def shift_along_axes(
     longest = np.maximum(width, width - growth).max(axis=0)  # of the widths after and before
     relative_growth = growth * (np.maximum(longest, 1.0) / tuning.agreement_m)
     disagreement = 1 - np.square(np.maximum(1 - np.square(relative_growth), 0.0))
-    # Less half the growth, the mean of both ends is the displacement of the end behind, plus half of it, that of the
-    # end ahead. Towards zero by half of it, it is that of the end that moved less.
+    # The displacements of the ends are ahead = (both + growth) / 2 and behind = (both - growth) / 2. That of the end
+    # that moved less is (|both| - |growth|) / 2, with the sign of `both`.
     to_end = np.copysign(growth, both)
     if nearer is not None:
         to_end = np.where(nearer != 0.0, np.sign(nearer) * growth, to_end)

@@ -118,19 +118,19 @@ class GeometryKernels:
 
         Returns:
             cost: (K,) cost of the displacement and of the differences in shape.
-            coverage: (K,) intersection over the smaller of the two.
+            overlap_of_smaller: (K,) intersection over the smaller of the two.
         """
         rows, columns = pairs
         kdop_a = a.kdop.take(rows, axis=1)
         kdop_b = b.kdop.take(columns, axis=1)
         distance, spread = mahalanobis(kdop_b - kdop_a, covariance.take(rows, axis=1), variance)
-        overlap, coverage = overlap_shares(kdop_a, kdop_b, self.shape_tuning)
+        overlap, overlap_of_smaller = overlap_shares(kdop_a, kdop_b, self.shape_tuning)
         size = np.abs(b.log_width.take(columns, axis=1) - a.log_width.take(rows, axis=1)).sum(axis=0) / 4
         height = np.abs(a.top[rows] - b.top[columns]) + np.abs(a.bottom[rows] - b.bottom[columns])
         points = np.abs(a.log_points[rows] - b.log_points[columns])
         shape = weights.size * size + weights.overlap * (1 - overlap)
         shape += weights.height * height / 2 + weights.points * points
-        return distance / 2 + shape + np.log(spread) / 2, coverage
+        return distance / 2 + shape + np.log(spread) / 2, overlap_of_smaller
 
     def measured(
         self, a: Float64, b: Float64, sight: Float64, variance: float, before: Float64

@@ -116,16 +116,16 @@ class NativeGeometryKernels(GeometryKernels):
         pairs: tuple[Int, Int],
         weights: PairWeights,
     ) -> tuple[Float64, Float64]:
-        """(K,) cost and coverage of pairs of shapes."""
+        """(K,) cost, and overlap of the smaller one, of pairs of shapes."""
         rows, columns = pairs
-        spread, cost, coverage = np.empty((3, len(rows)))
+        spread, cost, overlap_of_smaller = np.empty((3, len(rows)))
         shapes_a = _SHAPES.of(a, n=len(a))
         shapes_b = _SHAPES.of(b, n=len(b))
         self.library.modt_pair_costs(
             shapes_a, shapes_b, covariance, variance, rows, columns, len(rows), self._weights(weights), self._tuning,
-            spread, cost, coverage,
+            spread, cost, overlap_of_smaller,
         )  # fmt: skip
-        return cost + np.log(spread) / 2, coverage
+        return cost + np.log(spread) / 2, overlap_of_smaller
 
     def assign(self, rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
         """Indices, ascending, of the candidate pairs that a least-cost assignment keeps."""

@@ -125,7 +125,7 @@ def _step_back(tracks: TrackTable, rows: Int, dt_s: float) -> None:
 
 def _merge(tracks: TrackTable, lost: int, new: int) -> None:
     """Give a lost track the place and the motion of the new one. Its id, age, state and class stay."""
-    for name in _REPLACED:
+    for name in _REPLACED:  # any column that the tracker writes
         column = getattr(tracks, name)
         column[lost] = column[new]
     for name in _ADDED:

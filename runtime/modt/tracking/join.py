@@ -1,4 +1,7 @@
-"""Join: parts of a car or a cyclist, or of background that may be a car, are joined to the proposal of its track."""
+"""Join: parts of an object are joined to the proposal of its track.
+
+The object is a car, a cyclist, background that may be a car, or a person of whom the view shows only the legs.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +26,8 @@ def find_joins(now: Situation) -> Joins:
     """Parts within the known extents of tracks, then parts that come into view beside cars and cyclists."""
     known = _known_parts(now)
     new = _new_parts(now)
-    # Priority of hosts: the most senior track that knows the part, else the last listed track beside it.
+    # Priority of hosts: the most senior track that knows the part, else the last track beside it in the table. The
+    # latter choice is arbitrary.
     parts = np.concatenate([known.parts, new.parts[::-1]])
     hosts = np.concatenate([known.hosts, new.hosts[::-1]])
     first = first_of_each(parts, len(now.proposals))
@@ -43,12 +47,13 @@ def _known_parts(now: Situation) -> Joins:
     tracks = now.tracks
     pairs = now.pairs
     host = now.assignment.proposal_of_track[pairs.rows]
-    joins = pairs.free & (pairs.within > now.tuning.min_part_coverage) & (host != NONE) & (host != pairs.proposals)
-    joins &= (tracks.hits[pairs.rows] >= now.tuning.min_hits) & pairs.joinable[pairs.rows]
-    joined = joins.nonzero()[0]
-    rows = pairs.rows[joined]
-    parts = pairs.proposals[joined]
-    hosts = host[joined]
+    candidate = pairs.free & (pairs.within > now.tuning.min_part_coverage)
+    candidate &= (host != NONE) & (host != pairs.proposals)
+    candidate &= (tracks.hits[pairs.rows] >= now.tuning.min_hits) & pairs.joinable[pairs.rows]
+    candidates = candidate.nonzero()[0]
+    rows = pairs.rows[candidates]
+    parts = pairs.proposals[candidates]
+    hosts = host[candidates]
 
     is_car = IS_VEHICLE[tracks.object_class]
     known_m = widths(tracks.known_kdops(rows))
@@ -58,15 +63,16 @@ def _known_parts(now: Situation) -> Joins:
     stands_out = may_be_person & (top[parts] > top[hosts] + now.tuning.taller_m)
     stands_out &= now.observations.count[parts] >= now.tuning.min_person_points
     of_car_host = is_car[rows] & ~stands_out
-    # Cyclists and background no longer than a car join no possible person, background joins no part of a car.
-    may_be_car = known_m.max(axis=0, initial=0.0) < MAX_CAR_M
+    # A possible person is joined to cars only. A host that is neither car nor cyclist (background, or a person's
+    # legs) must be shorter than a car, and takes no proposal of a car's track.
+    may_be_car = known_m.max(axis=0) < MAX_CAR_M
     has_car_track = mask_at(is_car, now.assignment.track_of_proposal[parts])
     of_other_host = ~may_be_person & (IS_RIDER[tracks.object_class[rows]] | (may_be_car & ~has_car_track))
-    joins = of_car_host | of_other_host
+    accepted = of_car_host | of_other_host
     kdop = now.observations.kdop
     together = np.maximum(kdop.take(parts, axis=1), kdop.take(hosts, axis=1))
-    joins &= (widths(together) < known_m + now.tuning.max_excess_m).all(axis=0)
-    return Joins(parts[joins], hosts[joins])
+    accepted &= (widths(together) < known_m + now.tuning.max_excess_m).all(axis=0)
+    return Joins(parts[accepted], hosts[accepted])
 
 
 def _new_parts(now: Situation) -> Joins:

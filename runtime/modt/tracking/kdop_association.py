@@ -20,8 +20,9 @@ class KdopAssociation:
     """Matches k-DOPs.
 
     The visible part of an object changes with the view: its far side appears, a pole hides its rear, the field of
-    view cuts it. Along each of four axes a k-DOP has two ends, of which one usually stays: the smaller of their
-    displacements from where the filter expects them is the object's own, and pairs are costed by it alone.
+    view cuts it. Along each of four axes a k-DOP has two ends, of which one usually stays. Of the displacements of
+    both from where the filter expects them only the smaller enters the cost. Differences in size, overlap, height and
+    number of points are added.
 
     Args:
         kernels: passes over pairs.
@@ -51,7 +52,7 @@ class KdopAssociation:
         reached = expected + self._reach(covariance)
         rows, columns = self._kernels.overlapping_pairs(reached, observations.kdop)
         shape_tuning = self._kernels.shape_tuning
-        cost, coverage = self._kernels.pair_costs(
+        cost, overlap_of_smaller = self._kernels.pair_costs(
             Shapes.of(expected, tracks.bottom, tracks.top, tracks.points, shape_tuning),
             Shapes.of(observations.kdop, observations.bottom, observations.top, observations.count, shape_tuning),
             covariance,
@@ -63,10 +64,10 @@ class KdopAssociation:
         # Indices are pairs: first those of like shape by cost, then, of what is left over, those that overlap.
         first = (cost < max_cost).nonzero()[0]
         first = first[self._kernels.assign(rows[first], columns[first], cost[first], max_cost)]
-        second = (coverage > self._tuning.min_overlap).nonzero()[0]
+        second = (overlap_of_smaller > self._tuning.min_overlap).nonzero()[0]
         second = second[_free(rows[second], rows[first], len(tracks))]
         second = second[_free(columns[second], columns[first], len(observations))]
-        second = second[self._kernels.assign(rows[second], columns[second], 1 - coverage[second], 1.0)]
+        second = second[self._kernels.assign(rows[second], columns[second], 1 - overlap_of_smaller[second], 1.0)]
         kept = np.concatenate([first, second])
         return measured(tracks, observations, rows[kept], columns[kept], self._kernels, self._variance)
 
@@ -78,12 +79,13 @@ class KdopAssociation:
         """(M,) search radius [m] of tracks whose positions have the covariance xx, xy, yy (3, M).
 
         It is a margin and `reach_sigmas` standard deviations of the position. The deviations are fewer where the
-        missing overlap and the uncertainty of the position leave less of `max_cost` for the displacement.
+        missing overlap and the uncertainty of the position leave less of `max_cost` for the displacement. A jump of
+        an end (`jump_sigma_m`) is covered by the margin alone.
         """
         xx, xy, yy = covariance
-        least = self._jump_variance
-        uncertainty = np.log(((xx + least) * (yy + least) - xy * xy) / least**2)
-        # Greatest squared displacement, in standard deviations of the position.
+        variance_m2 = self._jump_variance
+        uncertainty = np.log(((xx + variance_m2) * (yy + variance_m2) - xy * xy) / variance_m2**2)
+        # Greatest squared displacement, in standard deviations, of a pair without overlap: it pays that weight whole.
         affordable = 2 * (self._tuning.max_cost - self._weights.overlap) - uncertainty
         squared = np.minimum(affordable, self._tuning.reach_sigmas**2)
         reach: Float64 = self._tuning.reach_margin_m + np.sqrt(np.maximum(squared, 0.0) * np.maximum(xx, yy))
@@ -134,8 +136,8 @@ def measured(
     return Matches(rows, proposals, position, covariance, end_variance.T)
 
 
-def with_whole_hosts(tracks: TrackTable, frame: Associated, kernels: GeometryKernels, variance: float) -> Matches:
-    """The matches of a frame, in which proposals that gained parts measure the positions of their tracks whole."""
+def remeasured_hosts(tracks: TrackTable, frame: Associated, kernels: GeometryKernels, variance: float) -> Matches:
+    """The matches of a frame. A joined proposal, all parts included, measures the position of its track."""
     matches = frame.matches
     joined = np.isin(matches.rows, frame.joined).nonzero()[0]
     rows = matches.rows[joined]

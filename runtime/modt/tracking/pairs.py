@@ -41,8 +41,8 @@ class Pairs(NamedTuple):
 
     rows: Int  # (K,) track of each pair
     proposals: Int  # (K,) proposal of each pair
-    within: Float64  # (K,) share of the proposal inside the known extent
-    around: Float64  # (K,) share of the expected track inside the proposal
+    within: Float64  # (K,) share of the proposal's area inside the known extent
+    around: Float64  # (K,) share of the expected track's area inside the proposal
     free: Bool  # (K,) the track may take the proposal, and one covers enough of the other (min_coverage)
     joinable: Bool  # (M,) tracks that may gain parts: all but pedestrians, and those whose upper half is cut off
     expected: Float64  # (8, M) k-DOPs of the tracks, where the filter expects them

@@ -1,8 +1,9 @@
 """Regrouping: which proposals, and which part of a proposal, make up the object of each track.
 
 Segmentation cuts a car at the pole before it, and joins a person to the wall that is touched. The tracks know better.
-Pairs of a track and a proposal that overlaps its known extent are listed once. From them follow three kinds of edits,
-which are records. Takes are applied first. Joins and splits are found from the result, and are applied together:
+Pairs of a track and a proposal that overlaps its known extent are listed once. From them follow three kinds of edits
+(plain records, applied later). Takes are applied first. Joins and splits are found from the result, and are applied
+together:
 
 - *Take*: a track takes the larger part of its object from a junior track, which gets the other part.
 - *Join*: parts of a car or a cyclist, or of background that may be a car, are joined to the proposal of its track. So
@@ -11,10 +12,10 @@ which are records. Takes are applied first. Joins and splits are found from the 
 - *Split*: the track of an object that is expected within a longer proposal takes the points where it is expected, if
   it has no proposal of its own, one that is too long for its class, or one of few points.
 
-The senior track has the greater product of hits and last points. Age would mislead: a fragment is as old as its car,
-and a bush is older than the car that passes it.
+The senior track has the greater product of hits and points of the last proposal. Age would mislead: a fragment is as
+old as its car, and a bush is older than the car that passes it.
 
-A proposal that gained parts measures the position of its track whole.
+The joined proposal, all parts included, measures the position of its track.
 
 What is joined does not extend the known extent of its track. Else each join would justify the next, and who leaves a
 parked car would be a part of it for metres.
@@ -35,7 +36,7 @@ from modt.observations import Observations, observe
 from modt.placement import Placement
 from modt.tracking.association import Associated, Matches
 from modt.tracking.join import Joins, find_joins
-from modt.tracking.kdop_association import with_whole_hosts
+from modt.tracking.kdop_association import remeasured_hosts
 from modt.tracking.pairs import Situation, with_rows
 from modt.tracking.split import Splits, find_splits, locate_pieces
 from modt.tracking.take import find_takes
@@ -117,8 +118,8 @@ class Regrouping:
         # A host has the heading of its track, since a part may lie across the car.
         rows_of_hosts = after_takes.assignment.track_of_proposal[joins.hosts]
         yaw[numbering.of_proposal[joins.hosts]] = tracks.box[rows_of_hosts, 6] - turn
-        few = self._reboxed(proposals, yaw[changed], changed)
-        observed = observe(few, placement.T_world_sensor, self._kernels)
+        changed_only = self._reboxed(proposals, yaw[changed], changed)
+        observed = observe(changed_only, placement.T_world_sensor, self._kernels)
         # The bearing of the centroid says when a proposal was seen. The odometry does the same, except across the
         # seam of the sweep, where it averages over the bearings of the box.
         observed = observed.moved(placement.deskew(observed.centroid))
@@ -131,8 +132,8 @@ class Regrouping:
         regrouped = Associated(
             proposals=replace(
                 proposals,
-                box=with_rows(proposals.box, changed, few.box),
-                centroid=with_rows(proposals.centroid, changed, few.centroid),
+                box=with_rows(proposals.box, changed, changed_only.box),
+                centroid=with_rows(proposals.centroid, changed, changed_only.centroid),
                 reflectance=None if reflectance is None else with_rows(reflectance, numbering.of_piece, np.nan),
             ),
             observations=after_takes.observations.regrouped(numbering.source, changed, observed),
@@ -141,7 +142,7 @@ class Regrouping:
         )
         if not len(rows_of_hosts):
             return regrouped
-        remeasured = with_whole_hosts(tracks, regrouped, self._kernels, self._position_variance)
+        remeasured = remeasured_hosts(tracks, regrouped, self._kernels, self._position_variance)
         return regrouped._replace(matches=remeasured)
 
     def _regrouped(self, former: Proposals, splits: Splits, numbering: _Numbering) -> Proposals:
@@ -161,10 +162,10 @@ class Regrouping:
         kernels = self._kernels
         runs = np.array((proposals.offsets[changed], proposals.offsets[changed + 1]))
         members, coordinates = kernels.copy_runs(proposals.members, proposals.coordinates, runs)
-        few = proposals.regrouped(members, coordinates, proposals.count[changed], changed)
-        box = kernels.upright_boxes(few.coordinates, few.offsets, yaw)
-        centroid = (kernels.group_sums(few.coordinates, few.offsets) / few.count).T
-        return replace(few, box=box, centroid=centroid)
+        changed_only = proposals.regrouped(members, coordinates, proposals.count[changed], changed)
+        box = kernels.upright_boxes(changed_only.coordinates, changed_only.offsets, yaw)
+        centroid = (kernels.group_sums(changed_only.coordinates, changed_only.offsets) / changed_only.count).T
+        return replace(changed_only, box=box, centroid=centroid)
 
     def _with_pieces(
         self, after_takes: Situation, splits: Splits, observed: Observations, matches: Matches

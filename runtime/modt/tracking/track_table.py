@@ -32,7 +32,8 @@ class TrackTable(Tracks):
     lagged_kdop: Float64 = column(float, 8)
     envelope: Float64 = column(float, 8, fill=-np.inf)  # known extent: largest k-DOP about the position, decaying [m]
     mean_kdop: Float64 = column(float, 8)  # mean of the k-DOP about the position; an end that jumps restarts [m]
-    end_variance: Float64 = column(float, 4)  # extra position variance along each axis, by ends that disagreed [m2]
+    # extra position variance along each axis, by ends that disagreed [m2]
+    end_variance: Float64 = column(float, 4)
     bottom: Float64 = column(float)  # lowest point last observed [m, world]
     top: Float64 = column(float)  # highest point last observed [m, world]
     kdop_position: Float64 = column(float, 2)  # measured position when `kdop` was observed [m, world]

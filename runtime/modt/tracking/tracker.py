@@ -255,9 +255,10 @@ class Tracker:
     def _weighed(self, log_ratio: Float64, frame: Associated, nearest: Float32 | None) -> Float64:
         """Evidence of moving (R,) of the matched tracks, less where a changing view explains it.
 
-        Where a proposal is bounded by what is nearer, or goes on there, its ends may move while the object rests. The
-        evidence of walkers is weak there already, as their positions are uncertain (`Hiding.loosened`). A flat and
-        low proposal of a background track is no evidence of motion. Evidence of rest counts in any case.
+        Where something nearer hides an end of a proposal, or its surface continues past that end, the end may move
+        though the object rests. The evidence of walkers is weak there already, as their positions are uncertain
+        (`Hiding.loosened`). A flat and low proposal of a background track is no evidence of motion. Evidence of rest
+        counts in any case.
         """
         tuning = self._evidence
         length_m, width_m, height_m = frame.proposals.box[frame.matches.proposals, 3:6].T
@@ -265,13 +266,13 @@ class Tracker:
         object_class = self.tracks.object_class[frame.matches.rows]
         is_object = object_class != ObjectClass.BACKGROUND.value
         weighed = np.where(flat & ~is_object, np.minimum(log_ratio, 0.0), log_ratio)
-        claims = ((weighed > 0) & ~IS_WALKER[object_class]).nonzero()[0]
-        if nearest is None or not len(claims):
+        weakened = ((weighed > 0) & ~IS_WALKER[object_class]).nonzero()[0]
+        if nearest is None or not len(weakened):
             return weighed
         compact = (length_m < tuning.max_compact_m) & (width_m > tuning.min_compact_width * length_m)
-        row = np.where(is_object, OBJECT, np.where(compact, COMPACT, ANY))[claims]
-        sides = self._sight.bounded_sides(nearest, frame.proposals, frame.matches.proposals[claims])
-        weighed[claims] *= self._weight_by_sides[row, sides.sum(axis=1)]
+        kind = np.where(is_object, OBJECT, np.where(compact, COMPACT, ANY))[weakened]
+        sides = self._sight.bounded_sides(nearest, frame.proposals, frame.matches.proposals[weakened])
+        weighed[weakened] *= self._weight_by_sides[kind, sides.sum(axis=1)]
         return weighed
 
     def _keep_tops(self, frame: Associated, box_before: Float64) -> Proposals:
@@ -317,22 +318,24 @@ class Tracker:
     def _decide_motion(self) -> None:
         """Write which tracks move and which are still, by the probability of moving and the distance gone.
 
-        The covariance of a velocity becomes the published one, which the filter writes anew in each frame.
+        Scales `velocity_covariance` of moving tracks in place. Call it once a frame, after the filter has written it.
 
         What flickers seems to move from one place to another, so no track starts to move as it reappears. An object
-        that moves does so until it is more likely at rest. Who walks behind a trolley, for example, is bounded by it
-        in most frames, and shows little evidence of motion. What bounds an object explains no way longer than itself.
+        that moves does so until it is more likely at rest. A person who walks behind a trolley, for example, is
+        partly hidden by it in most frames, and shows little evidence of motion. Occlusion shifts the visible part by
+        at most the object's own length. A larger displacement therefore counts as motion even below
+        `evidence.moving`. A track that more probably moves than rests, but does not count as moving, is unknown.
         """
         t = self.tracks
         evidence = self._evidence
         probable = t.moving_probability > 0.5
-        moved = t.motion == MotionState.MOVING.value
-        way = t.x[:, :2] - t.rest_position
-        is_object = probable & (t.object_class != ObjectClass.BACKGROUND.value)
+        was_moving = t.motion == MotionState.MOVING.value
+        displacement = t.x[:, :2] - t.rest_position
+        is_probable_object = probable & (t.object_class != ObjectClass.BACKGROUND.value)
         certain = t.moving_probability > evidence.moving
-        certain |= is_object & ~_is_shorter(way, WHOLE_SIZE_M[t.object_class, 0])
-        moves = (certain & (moved | ~t.reappears)) | (is_object & moved)
-        moves &= ~_is_shorter(way, evidence.min_distance_m)
+        certain |= is_probable_object & ~_is_shorter(displacement, WHOLE_SIZE_M[t.object_class, 0])
+        moves = (certain & (was_moving | ~t.reappears)) | (is_probable_object & was_moving)
+        moves &= ~_is_shorter(displacement, evidence.min_distance_m)
         is_decided = (moves | ~probable) & (t.hits >= evidence.min_hits)
         t.motion[:] = np.where(moves, MotionState.MOVING.value, MotionState.STILL.value)
         t.motion[~is_decided] = MotionState.UNKNOWN.value
