@@ -42,7 +42,7 @@ _FIRST = 10
 """Frames left out while tracks begin."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Work:
     """Mean work of a frame of a sensor in a mode, and its median CPU time on this machine."""
 

@@ -59,7 +59,7 @@ MARK = "tools.study.deskewing"
 BEGAN_S = 1_700_000_000.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Motion:
     """Poses of the sensor, interpolated between close ones.
 
@@ -90,7 +90,7 @@ class Motion:
         return T
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Instant:
     """A sweep as if seen at one instant.
 
@@ -107,7 +107,7 @@ class Instant:
     at_rest: Bool
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Drive:
     """Sweeps of a drive at a steady speed."""
 
@@ -141,7 +141,7 @@ class Drive:
         return tuple(CUTS_DEG) if self.rotating else (WITHOUT_CUT,)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Seen:
     """A sweep as it was recorded: (N, 3) points where the sensor saw them, (N,) times; the rest as in Instant."""
 
@@ -177,7 +177,7 @@ def seen(drive: Drive, sweep: Instant, cut: str) -> Seen:
     return Seen(drive.motion.placed(world, time_s, back=True), time_s, ordered)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Form:
     """Times of points in the messages of a driver.
 
@@ -249,7 +249,7 @@ class Witness:
         return self.located
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Distances:
     """Distances of what is at rest from where it is truly [m]: of middles of proposals, and of their returns."""
 

@@ -29,7 +29,7 @@ from modt_simulation.sensors import SENSORS
 from modt_simulation.synthetic_stream import SCENES, SyntheticStream
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Drive:
     """Frames with their labels, and the profile of their sensor."""
 
@@ -74,7 +74,7 @@ def add_options(options: ArgumentParser, scenes: Sequence[str], seeds: tuple[int
     options.add_argument("--mode", choices=assembly.MODES, default="accurate")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class SimulatedRun:
     """A simulated drive and the modes to run on it, as a task of an engine.
 

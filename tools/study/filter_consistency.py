@@ -38,7 +38,7 @@ DEGREES = 2
 CONFIDENCE = 0.95
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class BodyTrack:
     """States of a track on one body, and the true poses, over n frames.
 
@@ -111,7 +111,7 @@ def normalised(error: Float64, P: Float64) -> Float64:
     return out
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Consistency:
     """NEES of one kind of track and one part of the state.
 

@@ -66,7 +66,7 @@ ROW = re.compile(r"^\| `(?P<name>\S+)` \| (?P<value>\S+) \| (?P<others>.*) \|$",
 """A row of the page."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Constant:
     """One number of the method.
 
@@ -122,7 +122,7 @@ def with_value(part: Any, path: Sequence[str], value: float) -> Any:
     return replace(part, **{first: with_value(getattr(part, first), rest, value)})
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Score:
     """Figures of one drive."""
 

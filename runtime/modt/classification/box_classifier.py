@@ -73,7 +73,7 @@ _LENGTH_OFFSET_M = 0.05
 """Offset that keeps the logarithm of a length finite [m]."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class BoxClassifier:
     """Multilayer perceptron, and one for cut boxes, whose sizes are lower bounds.
 

@@ -19,7 +19,7 @@ _GROUND_SLOPE = 0.005
 """Growth of that bound with the range [m/m]."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Crops:
     """Points of R proposals, one after another."""
 

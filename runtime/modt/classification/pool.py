@@ -18,7 +18,7 @@ _MIN_PROBABILITY = 1e-12
 """Floor that keeps logarithms finite."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class PoolWeights:
     """Exponents of the likelihoods that multiply the class frequency to a posterior.
 

@@ -15,7 +15,7 @@ from modt.config import SensorConfig
 from modt.types import Bool, Float64, Proposals
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Scores:
     """Scores of the P proposals of a frame by box and reflectance.
 

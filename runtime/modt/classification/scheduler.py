@@ -13,7 +13,7 @@ from modt.classification.tuning import WorthTuning
 from modt.types import Bool, Budget, Evidence, Float64, Int, Motion, Proposals, Requests
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Selection:
     """Decision of the scheduler."""
 
@@ -48,7 +48,7 @@ class Savings:
         self.saved_ms -= cpu_ms if 0.0 <= cpu_ms < math.inf else 0.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class TimeLimit:
     """CPU time that the calls of a frame may take.
 

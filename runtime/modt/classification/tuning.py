@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class BatchingTuning:
     """Division of the crops of a frame into calls of the network."""
 
@@ -20,7 +20,7 @@ class BatchingTuning:
     """
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class MotionTuning:
     """Likelihood of the classes by motion and size, besides the table counted on simulated drives."""
 
@@ -55,7 +55,7 @@ class MotionTuning:
     """
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class EvidenceTuning:
     """Weights of views and boxes in the posterior of a track."""
 
@@ -98,7 +98,7 @@ class EvidenceTuning:
     """
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class RequestTuning:
     """Conditions under which a track asks for a classification."""
 
@@ -190,7 +190,7 @@ class RequestTuning:
     """
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class FusionTuning:
     """Fusion of all that is known of a track, and its requests for further views."""
 
@@ -199,7 +199,7 @@ class FusionTuning:
     requests: RequestTuning = RequestTuning()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class DecisionTuning:
     """Reported class, and class frequency of the stream."""
 
@@ -264,7 +264,7 @@ class DecisionTuning:
     """
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class WorthTuning:
     """Worth of a call, which decides who comes first where the budget binds."""
 
@@ -296,7 +296,7 @@ class WorthTuning:
     """
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class CallCostTuning:
     """Estimate of the CPU time of classifications."""
 
@@ -334,7 +334,7 @@ class CallCostTuning:
     """
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ClassificationTuning:
     """All chosen values of the stage, one part a mechanism."""
 

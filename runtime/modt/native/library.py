@@ -57,7 +57,7 @@ def address(numbers: Any) -> int:
         return data
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Member:
     """A member of a C structure.
 

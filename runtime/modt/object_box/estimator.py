@@ -42,7 +42,7 @@ class SeenBoxes:
         own.whole_box[:] = motion.box
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Seen:
     """Visible parts of the R objects in a frame.
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class HeadingTuning:
     """Heading of an object, from its motion and from the rectangle fitted to its points."""
 
@@ -141,7 +141,7 @@ class HeadingTuning:
     """
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class SizeTuning:
     """Size of an object, from its class and all that was seen of it."""
 
@@ -183,7 +183,7 @@ class SizeTuning:
     """
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class CentreTuning:
     """Centre of an object about the visible part."""
 
@@ -215,7 +215,7 @@ class CentreTuning:
     """
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ObjectBoxTuning:
     """All chosen values of the stage, one part a mechanism."""
 

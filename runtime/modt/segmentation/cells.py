@@ -18,7 +18,7 @@ from modt.segmentation.tuning import CellTuning, ClusterTuning, SplitTuning, Str
 from modt.types import NONE, Bool, Float32, Int, Int8, PointKind, Self
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Cells:
     """Occupied cells of a grid."""
 
@@ -89,7 +89,7 @@ def connect_coarse(grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32) -> Int
     return connect(grid, wide, max_gap_m.take(sample), np.ones(len(wide), np.bool_)).take(wide_of_cell)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ClusterSizes:
     """Sizes of G clusters, some of them empty."""
 
@@ -150,7 +150,7 @@ class ClusterSizes:
         return replace(self, points=points, bottom_m=bottom_m, top_m=top_m)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class AirOfCells:
     """How solid C cells are (`modt.segmentation.porosity`)."""
 
@@ -166,7 +166,7 @@ class AirOfCells:
         return cls(np.ones(n, np.float32), np.ones(n, np.float32), np.zeros(n, np.bool_), 0, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Clusters:
     """K points above ground in C cells, and cells in n clusters."""
 
@@ -350,7 +350,7 @@ def moved(
     return after, left.followed_by(replace(parts, points=parts.points * leaves))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Members:
     """M points by cluster, in the order of the sweep within a cluster."""
 

@@ -15,7 +15,7 @@ FAR_M = np.float32(1e6)
 """Farther than any return: cells of points nearer can be numbered."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class PointColumns:
     """Points of a sweep, one contiguous column a coordinate: the fastest layout for vectorised arithmetic."""
 

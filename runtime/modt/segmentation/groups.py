@@ -13,7 +13,7 @@ from modt.types import NONE, Bool, Float32, Float64, Int, Self
 T = TypeVar("T", bound=np.generic)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Groups:
     """Rows sorted by group; no group is empty."""
 

@@ -25,7 +25,7 @@ _STRIDE = np.int64(1) << 32
 _NO_ROWS = np.zeros(0, np.int64)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class SensorProposals:
     """View of a frame by one sensor.
 

@@ -17,7 +17,7 @@ DIRECTION, RANGE, HEIGHT, ELEVATION = range(4)
 """Rows of the bounds: pseudo-angle, range [m], height above ground [m], and tangent of the elevation."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ViewBounds:
     """Bounds of groups of cells as the sensor sees them, in the rows DIRECTION, RANGE, HEIGHT and ELEVATION."""
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from modt.class_sizes import SPLIT_PERSON, STRIP_PERSON, PersonSize
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class PolarGridTuning:
     """Cells of the polar grid on which the ground is found."""
 
@@ -26,7 +26,7 @@ class PolarGridTuning:
     Chosen on: KITTI scans."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class SensorHeightTuning:
     """Estimate of the sensor's height, where the profile has none."""
 
@@ -46,7 +46,7 @@ class SensorHeightTuning:
     Chosen on: simulated rooms."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class GroundTuning:
     """Tracing of the ground along the rays of the polar grid."""
 
@@ -98,7 +98,7 @@ class GroundTuning:
     """Least height of such a return [m]. Chosen on: the range noise of common sensors."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class CeilingTuning:
     """The ceiling of a room, below which objects end. Heights are above the ground."""
 
@@ -126,7 +126,7 @@ class CeilingTuning:
     """Height that hardly anybody exceeds [m]. Less cuts heads, more leaves beams. Chosen on: simulated car parks."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class CellTuning:
     """Connection of neighbouring cells."""
 
@@ -138,7 +138,7 @@ class CellTuning:
     Chosen on: KITTI scans."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class PorosityTuning:
     """Returns from the air. Chosen on: simulated crowds and yards in fog, dust and snow, and streets in clear air."""
 
@@ -167,7 +167,7 @@ class PorosityTuning:
     """Range up to which returns of the air are looked for [m]; farther away, fog and flakes return too little."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class SplitTuning:
     """Split of a person off a cluster that holds a person and more."""
 
@@ -183,7 +183,7 @@ class SplitTuning:
     """Points below which a part is not split off. Chosen on: sensor study."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class HeadTuning:
     """People side by side, or behind a load, in one cluster.
 
@@ -229,7 +229,7 @@ class HeadTuning:
     """Least height of the top of a load [m]. Less takes the front wheel of a bicycle for one."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class StructureTuning:
     """Long surfaces within clusters, and the parts before them that leave.
 
@@ -284,7 +284,7 @@ class StructureTuning:
     """Share of hanging cells from which a cluster is a canopy. Its hanging cells join nothing below."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ClusterTuning:
     """Clusters that are kept although they are low, or parts of an oversized one."""
 
@@ -300,7 +300,7 @@ class ClusterTuning:
     Chosen on: KITTI scans."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class LowTuning:
     """Things lower than `clearance_m`, and feet of what is higher."""
 
@@ -320,7 +320,7 @@ class LowTuning:
     """Range up to which the smallest low group is above the ground [m]. Chosen on: judgement."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class StripTuning:
     """Strips that make one car, and that car. Few beams show a rear and, above and behind it, a strip of roof."""
 
@@ -352,7 +352,7 @@ class StripTuning:
     """Greatest distance in elevation from the nearer strip to the farther one [beam spacings]."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ViewTuning:
     """Edge of a limited field of view. Chosen on: KITTI scans within the camera's view."""
 
@@ -364,7 +364,7 @@ class ViewTuning:
     """Distance from the end of the margin within which a proposal is cut there [m]."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class HeadingTuning:
     """Heading of a box by the closeness of its sides to the cells."""
 
@@ -374,7 +374,7 @@ class HeadingTuning:
     """Distance within which a cell lies on a side [m]. Chosen on: KITTI scans; models are trained with this value."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ViewEndTuning:
     """Sides of a proposal that end where the view of the sensor ends."""
 
@@ -387,7 +387,7 @@ class ViewEndTuning:
     Chosen on: the training data of those models."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class JoiningTuning:
     """Proposals of several sensors that are one object."""
 
@@ -398,7 +398,7 @@ class JoiningTuning:
     """Greatest gap in height between the parts of an object that two sensors see [m]. Chosen on: judgement."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class SegmentationTuning:
     """All values of the stage."""
 

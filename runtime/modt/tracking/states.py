@@ -42,7 +42,7 @@ class StateEvent(IntEnum):
     """A classification leaves the class unconfirmed."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class State:
     """A state of a proposal or track.
 
@@ -59,7 +59,7 @@ class State:
     joining: StateEvent = StateEvent.JOINS_WAITING
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Transition:
     """One row of a table.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class FilterTuning:
     """Noise of the extended Kalman filter (Equation 1), which profiles without extensions use."""
 
@@ -27,7 +27,7 @@ class FilterTuning:
     Chosen on: judgement."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class MotionFilterTuning:
     """Filter of two hypotheses, at rest and moving."""
 
@@ -93,7 +93,7 @@ class MotionFilterTuning:
     Chosen on: judgement."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class MotionEvidenceTuning:
     """Weight of motion that a changing view explains."""
 
@@ -152,7 +152,7 @@ class MotionEvidenceTuning:
     Chosen on: simulated snow and streets."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class SightTuning:
     """Lines of sight beside proposals."""
 
@@ -168,7 +168,7 @@ class SightTuning:
     Chosen on: simulated scenes, by static things that were reported as moving."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class KdopAssociationTuning:
     """Association of k-DOPs, and the measurement of positions by them."""
 
@@ -221,7 +221,7 @@ class KdopAssociationTuning:
     Chosen on: judgement."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class PaperAssociationTuning:
     """Association of profile `paper` (section III-B)."""
 
@@ -242,7 +242,7 @@ class PaperAssociationTuning:
     Chosen on: drive 0005, by the nearness to Table VI."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ExtentTuning:
     """Memory of the extent, the shape and the size of a track, and of the place that it comes from."""
 
@@ -275,7 +275,7 @@ class ExtentTuning:
     Chosen on: judgement."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class RestTuning:
     """Test whether a track is at rest."""
 
@@ -302,7 +302,7 @@ class RestTuning:
     Chosen on: judgement."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class HidingTuning:
     """People in hiding."""
 
@@ -327,7 +327,7 @@ class HidingTuning:
     Chosen on: judgement."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class RegroupingTuning:
     """Limits of regrouping."""
 
@@ -396,7 +396,7 @@ class RegroupingTuning:
     Chosen on: judgement."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class TrackingTuning:
     """Everything that is chosen in the tracking stage."""
 

@@ -58,7 +58,7 @@ class SegmentedFrame:
     objects: ObjectPoints
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class SegmentedDrive:
     """All sweeps of a drive, with the segmented field of view and the rules of the judgement."""
 
