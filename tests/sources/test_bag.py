@@ -38,7 +38,7 @@ def stamps_of(frames):
 
 def tenths(n, first=0):
     """Numbers a tenth apart, of some stamps or of the way of the robot."""
-    return pytest.approx(first + np.arange(n) / 10, abs=1e-5)
+    return pytest.approx(first + np.arange(n) / 10, abs=1e-6)
 
 
 def test_sweeps_are_frames_and_stamps_count_from_the_first(opened):
