@@ -267,7 +267,10 @@ class WholeBoxes(SeenBoxes):
         return np.where(IS_WALKER[seen.object_class], shoulders, np.clip(ratio, -most, most))
 
     def _evidence_of_neighbours(self, seen: Seen) -> Float64:
-        """(R,) the same by the neighbours: the most where one stands along the longer visible side, or across it."""
+        """(R,) evidence of the neighbours for a heading along the longer visible side.
+
+        Positive where the neighbour stands along that side, negative where it stands across it, and 0 without one.
+        """
         along = _dot(seen.neighbour, seen.long_side)
         return self.tuning.heading.neighbour_evidence * (2 * along * along - _dot(seen.neighbour, seen.neighbour))
 

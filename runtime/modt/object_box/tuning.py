@@ -122,7 +122,7 @@ class HeadingTuning:
     beside_m: float = 3.0
     """Distance across it up to which that is so [m]. With more, cars in the next row are turned as this one.
 
-    Chosen on: the same, and a posed car park whose rows stand across each other.
+    Chosen on: the labels of KITTI's objects, and a posed car park whose rows stand across each other.
     """
     neighbour_evidence: float = 1.0
     """Evidence that a car has the axis of its neighbour. With more, cars that stand otherwise are turned.

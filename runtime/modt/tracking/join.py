@@ -59,10 +59,7 @@ def _known_parts(now: Situation) -> Joins:
     known_m = widths(tracks.known_kdops(rows))
     may_be_person = _may_be_person(now, parts)
     # A car has parts of every shape, but nobody who is clearly seen above it, as in its open door.
-    top = now.observations.top
-    stands_out = may_be_person & (top[parts] > top[hosts] + now.tuning.taller_m)
-    stands_out &= now.observations.count[parts] >= now.tuning.min_person_points
-    of_car_host = is_car[rows] & ~stands_out
+    of_car_host = is_car[rows] & ~(may_be_person & _stands_above(now, parts, hosts))
     # A possible person is joined to cars only. A host that is neither car nor cyclist (background, or a person's
     # legs) must be shorter than a car, and takes no proposal of a car's track.
     may_be_car = known_m.max(axis=0) < MAX_CAR_M
@@ -103,6 +100,13 @@ def _new_parts(now: Situation) -> Joins:
     box = now.observations.box
     fit = fit_together(box[hosts], box[parts], size_m[beside]) & ~_may_be_person(now, parts)
     return Joins(parts[fit], hosts[fit])
+
+
+def _stands_above(now: Situation, parts: Int, hosts: Int) -> Bool:
+    """(k,) parts (k,) of enough points that are clearly taller than the proposals of their hosts (k,)."""
+    top = now.observations.top
+    is_clear: Bool = now.observations.count[parts] >= now.tuning.min_person_points
+    return is_clear & (top[parts] > top[hosts] + now.tuning.taller_m)
 
 
 def _may_be_person(now: Situation, proposals: Int) -> Bool:
