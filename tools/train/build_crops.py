@@ -32,7 +32,7 @@ from tools.train.labelled_scans import (
 )
 from tools.train.near_scans import near_scans
 from tools.train.paste import cut_objects, paste_objects
-from tools.train.people_scans import people_scans
+from tools.train.people_scans import low_people_scans, people_scans
 from tools.train.rider_scans import rider_scans
 from tools.train.synthetic_scans import label_files, scans_from_labels
 from tools.train.worn_scans import worn_scans
@@ -49,13 +49,15 @@ SIMULATED: Mapping[str, Callable[..., Iterator[Scan]]] = {
     "near": near_scans,
     "bare": bare_scans,
     "people": people_scans,
+    "low": low_people_scans,
     "riders": rider_scans,
     "worn": worn_scans,
 }
 """Sweeps of the kinds of worlds, by seeds."""
 FEW_BEAMS = ("vlp-16", "vlp-16", "mid-360")
 FEW_POINTS = ("mid-360", "mid-360", "vlp-16")
-"""Sensors of few beams and of few points a sweep, in turn."""
+OF_ROBOTS = (*FEW_BEAMS, "os1-64")
+"""Sensors of few beams, of few points a sweep, and of small robots, in turn."""
 SEEDS_APART = 100_000
 """Number of worlds between the first ones of two seeds."""
 

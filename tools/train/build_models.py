@@ -21,6 +21,7 @@ from tools.options import parser
 from tools.train.build_crops import (
     FEW_BEAMS,
     FEW_POINTS,
+    OF_ROBOTS,
     kitti_crops,
     own_crops,
     simulated_crops,
@@ -42,6 +43,7 @@ BARE_WORLDS = {3: 880, 4: 110}
 PEOPLE_WORLDS = {5: 400, 7: 400, 6: 220}
 """Seed and number of the worlds of people in all postures, the last for the card, the others for training."""
 SPARSE_WORLDS = {
+    "low": (16, 1200, OF_ROBOTS),
     "people": (12, 260, FEW_BEAMS),
     "riders": (13, 240, FEW_POINTS),
 }
@@ -109,7 +111,7 @@ def train_further(crops: list[Path], work: Path, out: Path, steps: int, *options
     """Train a model on worlds without objects and on worlds of people. Its own data sets are `crops`."""
     sparse = {kind: work / f"{kind}-{seed}.npz" for kind, (seed, _, _) in SPARSE_WORLDS.items()}
     bare = [work / f"bare-{seed}.npz" for seed in BARE_WORLDS]
-    people = [sparse["people"], *(work / f"people-{seed}.npz" for seed in PEOPLE_WORLDS)]
+    people = [sparse["low"], sparse["people"], *(work / f"people-{seed}.npz" for seed in PEOPLE_WORLDS)]
     first_riders, held_riders = (work / f"riders-{seed}.npz" for seed in RIDER_WORLDS)
     riders = [first_riders, sparse["riders"], held_riders]
     worn = [work / f"worn-{seed}.npz" for seed in WORN_WORLDS]

@@ -76,7 +76,7 @@ def near_scene(rng: Generator, height_m: float) -> World:
 def _person(builder: SceneBuilder, x: float, y: float, turn: float) -> None:
     """Add a person who stands, walks or, rarely, sits, or who is in any posture."""
     if builder.rng.random() < POSED_SHARE:
-        people_scans.person(builder, x, y, turn)
+        people_scans.person(builder, x, y, turn, people_scans.WAYS)
         return
     draw = builder.rng.random()
     if draw < 0.5:

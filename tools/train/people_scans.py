@@ -6,8 +6,9 @@ background.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.random import Generator
@@ -47,8 +48,8 @@ TOUCHING_M = 0.0
 """Margin around bodies, which may touch."""
 
 
-def people_scene(rng: Generator, height_m: float) -> World:
-    """A robot at rest among people in all postures and things of their size, in the open or between walls."""
+def people_scene(rng: Generator, height_m: float, ways: Sequence[Way]) -> World:
+    """A robot at rest among people, met in these ways, and things of their size, in the open or between walls."""
     builder = SceneBuilder(rng, 4.0)
     if rng.random() < ROWS_SHARE:
         rows(builder)
@@ -59,7 +60,7 @@ def people_scene(rng: Generator, height_m: float) -> World:
         x, y = distance * np.cos(bearing), distance * np.sin(bearing)
         turn = float(rng.uniform(-np.pi, np.pi))
         if draw < PERSON_SHARE:
-            person(builder, x, y, turn)
+            person(builder, x, y, turn, ways)
             if rng.random() < PAIR_SHARE:
                 apart = rng.uniform(0.55, 0.9)
                 across = bearing + np.pi / 2
@@ -141,10 +142,10 @@ def _upright(builder: SceneBuilder, x: float, y: float, turn: float) -> None:
     builder.pedestrian(path, speed, height)
 
 
-def person(builder: SceneBuilder, x: float, y: float, turn: float) -> None:
-    """Add a person in any posture, with any belongings."""
+def person(builder: SceneBuilder, x: float, y: float, turn: float, ways: Sequence[Way]) -> None:
+    """Add a person in any posture, with any belongings, met in one of some ways."""
     rng = builder.rng
-    way = WAYS[rng.choice(len(WAYS))]
+    way = ways[rng.choice(len(ways))]
     way(builder, Place(x, y, turn, _height(rng), _joints(rng)))
 
 
@@ -230,6 +231,11 @@ WAYS: tuple[Way, ...] = (
     _low(Posture.KNEEL), *(_lie,) * 2,
 )  # fmt: skip
 """Ways in which people are met, some oftener than others."""
+LOW_WAYS: tuple[Way, ...] = (
+    *(_stand,) * 3, *(_carry,) * 3, *(_low(Posture.CROUCH),) * 4, *(_low(Posture.KNEEL),) * 3, *(_lie,) * 4,
+    _low(Posture.FLOOR), _sit,
+)  # fmt: skip
+"""The same with more of the postures of which few beams show little."""
 
 
 def _shrub(rng: Generator) -> Solids:
@@ -262,12 +268,14 @@ THINGS: tuple[Callable[[Generator], Solids], ...] = (
 )  # fmt: skip
 
 
-people_scans = Worlds(
+WORLDS = Worlds(
     name="people",
     stream=6,
-    scene=people_scene,
+    scene=partial(people_scene, ways=WAYS),
     height_m=(0.25, 2.2),
     usual_height_share=0.3,
     sweeps=10,
     profile=mounted,
-).scans
+)
+people_scans = WORLDS.scans
+low_people_scans = replace(WORLDS, scene=partial(people_scene, ways=LOW_WAYS)).scans

@@ -5,16 +5,16 @@
                          --crops CROPS.npz... [--keep-boxes] [--steps N]
 
 Streets have no heaps, few scooters, and their people stand and walk. A network that has seen nothing else takes a
-heap or a row of scooters for a car, and who sits or crouches for background. The network is trained on with six
-kinds of crops beside one another: those of --bare are background, those of --people, --riders, --worn and --streets
-have the labels of the simulator, and those of --crops, the data of the model, keep the posterior that the network
-gives them. A share of these is changed as worn sensors would measure them, and keeps the posterior of the unchanged.
-So the class frequencies that the posteriors assume hold on streets. Crops of that data that are as narrow and low as
-a person are drawn oftener: bins, plants, signs and posts of streets stay background. The box classifier is trained
-alike, without augmentation: the box of a car of which a part is cut off is the box of a heap. One that has learnt
-these sweeps before is kept by --keep-boxes: to learn them again costs cars and people of real scans. The model is
-replaced, and its card gets a section with the false objects, the people and the riders on the held data sets, on
-which nothing is trained.
+heap or a row of scooters for a car, and who sits or crouches for background. The network is trained on with six kinds
+of crops beside one another: those of --bare are background, those of --people, --riders, --worn and --streets have
+the labels of the simulator, and those of --crops, the data of the model, keep the posterior that the network gives
+them. A share of these is changed as worn sensors would measure them, and keeps the posterior of the unchanged. So the
+class frequencies that the posteriors assume hold on streets. Crops of that data that are as narrow and low as a
+person are drawn oftener, half of them people: bins, plants, signs and posts of streets stay background, and who walks
+there stays a person. The box classifier is trained alike, without augmentation: the box of a car of which a part is
+cut off is the box of a heap. One that has learnt these sweeps before is kept by --keep-boxes: to learn them again
+costs cars and people of real scans. The model is replaced, and its card gets a section with the false objects, the
+people and the riders on the held data sets, on which nothing is trained.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ from modt_training.fine_tuning import (
 )
 from tools.options import make_torch_deterministic, parser
 
-KEPT_SIZE = 384
+KEPT_SIZE = 640
 """Number of crops of the data of the model of a step, which keep their posterior."""
 BARE_SIZE = 48
 """Number of bare crops of a step."""
@@ -80,7 +80,7 @@ MIN_BARE_POINTS = 20
 """Least number of points of an augmented bare crop: fewer tell no heap from a part of a car."""
 MAX_RANGE_M = 45.0
 """Greatest distance of an augmented bare crop, for the same reason."""
-PEOPLE_SIZE = 160
+PEOPLE_SIZE = 208
 """Number of crops of people, and of things beside them, of a step: as many of the one as of the other."""
 PEOPLE_BATCHES = 250
 """Batches of such crops, half of them augmented."""
@@ -106,7 +106,7 @@ MIN_THING_POINTS = 6
 """Least number of points of a thing in such a crop."""
 MAX_THING_M = 50.0
 """Greatest distance of a thing in such a crop: far things of few points are things."""
-NARROW_SIZE = 160
+NARROW_SIZE = 224
 """Number of narrow crops of the data of the model of a step, which keep their posterior."""
 NARROW_BATCHES = 320
 """Batches of such crops, half of them augmented."""
@@ -114,7 +114,7 @@ MAX_NARROW_TOP_M = 2.0
 """Greatest height of their top above ground: that of a person."""
 MAX_NARROW_M = 1.3
 """Greatest extent of their points along either axis."""
-RIDER_SIZE = 128
+RIDER_SIZE = 192
 """Number of crops of roads with rows of two-wheelers of a step."""
 RIDER_BATCHES = 200
 """Batches of such crops, half of them augmented."""
@@ -207,8 +207,11 @@ def narrow(data: Dataset) -> Int:
 
 
 def narrow_examples(model: Model, data: Dataset, rng: Generator) -> Examples:
-    """Narrow crops of the data of the model, each with the posterior that the network gives it."""
-    drawn = rng.choice(narrow(data), (NARROW_BATCHES, BATCH_SIZE))
+    """Narrow crops of the data of the model, half of them people, with the posteriors that the network gives them."""
+    rows = narrow(data)
+    is_person = data.label[rows] == ObjectClass.PEDESTRIAN
+    share = 1.0 / np.where(is_person, is_person.sum(), (~is_person).sum())
+    drawn = rng.choice(rows, (NARROW_BATCHES, BATCH_SIZE), p=share / share.sum())
     local = joined([augmented(data, drawn[::2], rng)[0], unchanged(data, drawn[1::2], rng)[0]])
     return Examples(local, model.network_posterior(local), NARROW_SIZE, np.zeros(N_CLASSES))
 

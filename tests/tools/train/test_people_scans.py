@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from modt.classes import ObjectClass
+from modt_simulation.builder import LOW_M
 from modt_simulation.people import PERSON, Person, Posture, people_solids
 from tests.tools.train.scans import assert_same, labels_of
-from tools.train.people_scans import people_scans
+from tools.train.people_scans import LOW_WAYS, WAYS, people_scans, people_scene
 
 SENSORS = ("vlp-16", "mid-360")
 
@@ -21,6 +22,16 @@ def test_a_sweep_has_people_and_things():
 
 def test_a_sweep_is_the_same_whenever_it_is_made():
     assert_same(*(people_scans([7, 8], SENSORS) for _ in range(2)))
+
+
+def _low_people(ways) -> int:
+    """People in postures near the ground in four worlds."""
+    worlds = [people_scene(np.random.default_rng(seed), 1.0, ways) for seed in range(4)]
+    return sum(body.size in LOW_M.values() for world in worlds for body in world.bodies)
+
+
+def test_more_people_are_low_where_it_is_asked_for():
+    assert _low_people(LOW_WAYS) > 1.4 * _low_people(WAYS) > 0
 
 
 def _top_m(posture: Posture, height: float = 1.7, **joints: float) -> float:
