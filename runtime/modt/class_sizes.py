@@ -65,6 +65,9 @@ SPLIT_PERSON = PersonSize(1.3, min_height_m=0.5, min_top_m=1.1, max_top_m=2.2, m
 """Bounds for a part that is split off a cluster, from a child of five to a tall person in stride on a kerb."""
 STRIP_PERSON = PersonSize(0.9, min_height_m=0.7, min_top_m=1.1)
 """Bounds for a strip that is not merged into a car. Its extent is its width across the ray."""
+HIDDEN_PERSON = PersonSize(0.75, min_height_m=0.2, min_top_m=1.35, max_top_m=2.2)
+"""Bounds for head and shoulders behind something that hides the rest, as a counter does. What is wider may be the
+roof of a car behind its bonnet."""
 PART_PERSON = PersonSize(MAX_PERSON_M, min_height_m=1.0)
 """Bounds for a proposal that is not merged into background, from a child of five on."""
 

@@ -134,9 +134,12 @@ def car_targets(bounds, beam, limits):
         size = np.hypot(far[own].max() - near[own].min(), width(own))
         return size < limits.max_diagonal_m and width(own) < limits.max_width_m and top[own].max() < limits.max_top_m
 
+    def fits(one, size):
+        narrow = width([one]) < size.max_extent_m and size.min_top_m < top[one] < size.max_top_m
+        return narrow and top[one] - low[one] > size.min_height_m
+
     def person(one):
-        narrow = width([one]) < limits.person.max_extent_m and top[one] > limits.person.min_top_m
-        return narrow and top[one] - low[one] > limits.person.min_height_m
+        return fits(one, limits.person)
 
     connected = [[] for _ in range(n)]
     for front in range(n):
@@ -146,10 +149,11 @@ def car_targets(bounds, beam, limits):
                 continue
             meets = max(right[front], right[back]) <= min(left[front], left[back])
             beams = (down[back] - up[front]) / beam
+            apart = near[back] < limits.max_hidden_range_m and fits(back, limits.hidden_person)
             follows = near[back] - far[front] < limits.max_gap_m
             follows = follows and limits.min_gap_beams < beams < limits.max_gap_beams
             like = width(pair) > limits.min_width_m and top[pair].max() > limits.min_top_m
-            if meets and follows and like and low[pair].min() < limits.max_bottom_m:
+            if meets and follows and like and not apart and low[pair].min() < limits.max_bottom_m:
                 connected[front].append(back)
                 connected[back].append(front)
     first = np.arange(n)

@@ -16,6 +16,7 @@ from tests.segmentation import reference, scans
 
 BEAM = np.tan(np.deg2rad(SensorConfig().elevation_step_deg))
 PERSON = (0.35, 0.5, 0.0, 1.75)
+HEAD_AND_SHOULDERS = (0.35, 0.5, 1.1, 1.75)
 
 
 def strips(rng, n):
@@ -85,6 +86,7 @@ def test_rear_and_roof_are_one_car(x, y):
     "pair",
     [
         [(30.0, 0.0, 4.2, 1.8, 0.2, 1.2), (33.6, 0.2, *PERSON)],  # a person behind a car
+        [(17.0, 0.0, 0.5, 1.2, 0.0, 1.1), (18.4, 0.1, *HEAD_AND_SHOULDERS)],  # behind a crate
         [(30.0, 0.0, 0.4, 0.4, 0.0, 1.1), (31.5, 0.2, *PERSON)],  # a person behind a bollard
         [(30.0, 0.0, *PERSON), (31.5, 0.3, *PERSON)],
         [(30.0, 0.0, 4.2, 1.8, 0.2, 1.4), (36.0, 0.0, 4.2, 1.8, 0.2, 1.9)],  # nose to tail, the second a van

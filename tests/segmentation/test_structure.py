@@ -100,6 +100,15 @@ def test_a_person_in_a_doorway_is_a_proposal():
     assert not np.isin(of_person[0], label(clusters)[: len(jambs)])
 
 
+@pytest.mark.parametrize(("wall_m", "leaves"), [(1.0, True), (1.6, False)])
+def test_head_and_shoulders_above_a_wall_are_a_proposal_and_what_is_as_high_as_the_wall_is_not(wall_m, leaves):
+    before = wall(-2, 2, 6.0, wall_m)
+    behind = person(0.3, 6.4)
+    seen = behind[(behind[:, 2] > 1.25) & (behind[:, 2] < 1.65)]
+    of_wall, of_person = np.split(label(clustered(np.concatenate([before, seen]))), [len(before)])
+    assert np.isin(of_person, of_wall).any() != leaves
+
+
 def test_a_beam_above_does_not_join_people():
     beam = np.concatenate([grid(np.arange(-6, 6, 0.05), y, 2.2) for y in (3.9, 4.0, 4.1)])
     beam = beam[beam[:, 2] > 1.7]

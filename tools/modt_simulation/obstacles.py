@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.random import Generator
@@ -42,6 +43,30 @@ SPEED_MPS = 0.4
 """Speed of the robot."""
 ROUGHNESS_M = {Material.PAVING: 0.01, Material.ASPHALT: 0.01, Material.GRASS: 0.03}
 """Standard deviation of the height of level ground."""
+
+
+class Cover(NamedTuple):
+    """What hides people up to the waist."""
+
+    depth_m: float
+    width_m: float
+    least_m: float  # height
+    greatest_m: float
+    material: Material
+    density: float = np.inf  # of foliage [1/m]
+
+    def solids(self, rng: Generator) -> Solids:
+        """One of a random height."""
+        size = self.depth_m, self.width_m, rng.uniform(self.least_m, self.greatest_m)
+        return block(size, self.material, density=self.density)
+
+
+COVERS = {
+    "counter": Cover(0.6, 2.5, 0.9, 1.15, Material.WOOD),
+    "crate": Cover(0.5, 1.0, 0.6, 1.1, Material.WOOD),
+    "hedge": Cover(0.6, 4.0, 0.7, 1.0, Material.FOLIAGE, 6.0),
+    "low wall": Cover(0.25, 4.0, 0.7, 1.1, Material.WALL),
+}
 
 
 def wall(rng: Generator, seconds: float, height_m: float) -> World:
@@ -247,6 +272,28 @@ def clutter(rng: Generator, seconds: float, height_m: float) -> World:
         builder.bodies.append(Body(kinds.OTHER, size, path, block(size, Material.WOOD), "low thing"))
     enclose(builder, (18.0, 18.0), 3.0)
     return _level(builder, Material.PAVING, height_m)
+
+
+def hidden(rng: Generator, seconds: float, height_m: float) -> World:
+    """People who stand or walk behind what hides them up to the waist, in a walled yard."""
+    builder = SceneBuilder(rng, seconds)
+    first = rng.uniform(-np.pi, np.pi)
+    for slot, (name, cover) in enumerate(COVERS.items()):
+        bearing = first + slot * 2 * np.pi / len(COVERS)
+        along = np.array([np.cos(bearing), np.sin(bearing)])
+        across = np.array([-along[1], along[0]])
+        distance = rng.uniform(2.5, 9.0)
+        builder.scenery(cover.solids(rng), *(distance * along).tolist(), bearing)
+        middle = (distance + cover.depth_m / 2 + rng.uniform(0.35, 1.2)) * along
+        speed = rng.uniform(0.5, 1.4) * rng.integers(2)
+        way = rng.choice((-0.5, 0.5)) * speed * seconds * across
+        role = f"behind a {name}"
+        if speed:
+            builder.walker([middle - way, middle + way], speed, role=role)
+        else:
+            builder.pedestrian(Path.standing(*middle.tolist(), rng.uniform(-np.pi, np.pi)), role=role)
+    enclose(builder, (18.0, 18.0), 3.0)
+    return _level(builder, Material.PAVING, height_m, 0.0)
 
 
 def _around(rng: Generator, nearest_m: float, farthest_m: float) -> tuple[float, float, float]:

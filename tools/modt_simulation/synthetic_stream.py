@@ -21,6 +21,7 @@ from modt_simulation.obstacles import (
     grass,
     heaps,
     hedges,
+    hidden,
     hills,
     loading,
     movers,
@@ -45,7 +46,7 @@ SCENES = {
     scene.__name__: scene
     for scene in (
         *(street, crossing, yard, crowd, ramp, dock, hall, corridor, lobby, lift, warehouse, carpark),
-        *(wall, grass, hedges, vines, scooters, hills, heaps, stairs, movers, loading, postures, clutter),
+        *(wall, grass, hedges, vines, scooters, hills, heaps, stairs, movers, loading, postures, hidden, clutter),
     )
 }
 """Scene by name: the world by a random generator, a duration [s] and the height of the sensor [m]."""

@@ -442,6 +442,7 @@ typedef struct {
     double *distance_m;             /* (n,) */
     uint8_t *is_free;               /* (n,) whether a cell is on no surface of a cluster with one */
     float *before_m;                /* (n,) distance of such a cell before surfaces, infinite without */
+    float *surface_top_m;           /* (n,) greatest height of the surfaces of its cluster, infinite without */
     float *front_m, *back_m;        /* (n,) greatest and least of those of each part */
     SurfaceScratch surface;
 } ClusterScratch;
@@ -477,6 +478,7 @@ static i64 place_scratch(i64 n, i32 side, void *memory, ClusterScratch *s)
     TAKE(&end, s->distance_m, n);
     TAKE(&end, s->is_free, n);
     TAKE(&end, s->before_m, n);
+    TAKE(&end, s->surface_top_m, n);
     TAKE(&end, s->front_m, n);
     TAKE(&end, s->back_m, n);
     place_surface_scratch(n, &end, &s->surface);
@@ -737,8 +739,8 @@ static void move_parts(const Cells *cells, const ClusterScratch *s, i64 n_used, 
         }
 }
 
-/* CellClusterer._before_surfaces, of n clusters: uses the cells that are free, and sets their `before_m`. Returns how
- * many they are. */
+/* CellClusterer._before_surfaces, of n clusters: uses the cells that are free, and sets their `before_m` and
+ * `surface_top_m`. Returns how many they are. */
 static i64 find_free_cells(const ClusterRules *rules, const StructureRules *surfaces, const PersonSize *person,
                            const Cells *cells, const PointColumns *sampled, i64 n_cells, const i64 *cluster,
                            const ClusterSizes *sizes, i64 n, const ClusterScratch *s)
@@ -790,9 +792,13 @@ static i64 find_free_cells(const ClusterRules *rules, const StructureRules *surf
         i64 found = find_surfaces(surfaces, s->x, s->y, s->width_m, m, &s->surface, s->on_surface, s->distance_m);
         if (!found && !canopy)
             continue;
+        float top_m = found ? -INFINITY : INFINITY;
+        for (i32 k = 0; k < m; k++)
+            top_m = s->on_surface[k] ? maxf(cells->high[s->row_cells[k]], top_m) : top_m;
         for (i32 k = 0; k < m; k++) {
             s->is_free[s->row_cells[k]] = !s->on_surface[k];
             s->before_m[s->row_cells[k]] = found ? (float)s->distance_m[k] : FAR_M;
+            s->surface_top_m[s->row_cells[k]] = top_m;
         }
     }
     /* 4. The free ones, in their order. */
@@ -805,9 +811,9 @@ static i64 find_free_cells(const ClusterRules *rules, const StructureRules *surf
 }
 
 /* CellClusterer._leaves_surface: sets `cluster_of_part` of those that leave, which are numbered from n on. */
-static void find_leaving(const ClusterRules *rules, const StructureRules *surfaces, const PersonSize *person, i64 n_used,
-                         const i64 *cluster, const ClusterSizes *sizes, i64 n, const ClusterSizes *parts, i64 n_parts,
-                         const ClusterScratch *s)
+static void find_leaving(const ClusterRules *rules, const StructureRules *surfaces, const PersonSize *person,
+                         const PersonSize *hidden_person, i64 n_used, const i64 *cluster, const ClusterSizes *sizes,
+                         i64 n, const ClusterSizes *parts, i64 n_parts, const ClusterScratch *s)
 {
     for (i64 p = 0; p < n_parts; p++) {
         s->front_m[p] = -INFINITY;
@@ -830,7 +836,10 @@ static void find_leaving(const ClusterRules *rules, const StructureRules *surfac
         int possible = may_be_person_part(rules, person, parts, p) && parts->bottom_m[p] < surfaces->max_bottom_m;
         int stands_out = parts->points[p] >= surfaces->min_part_points && parts->top_m[p] >= surfaces->min_part_top_m &&
                          parts->extent_m[p] >= surfaces->min_part_extent_m;
-        int leaves = (before && (possible || (extent_m >= surfaces->oversized_m && stands_out))) ||
+        int hidden = front_m < 0 && back_m > -surfaces->max_hidden_m &&
+                     parts->top_m[p] > s->surface_top_m[parts->cell[p]] + surfaces->min_above_m &&
+                     may_be_person_part(rules, hidden_person, parts, p);
+        int leaves = (before && (possible || (extent_m >= surfaces->oversized_m && stands_out))) || hidden ||
                      (extent_m >= rules->max_extent_m && stands_out);
         s->cluster_of_part[p] = leaves ? (i32)(n + p) : NONE;
     }
@@ -840,8 +849,8 @@ static void find_leaving(const ClusterRules *rules, const StructureRules *surfac
  * how many clusters there are: those of the coarse grid, the parts tried, and the parts tried before surfaces. There
  * is room for the sizes of 3 n_cells. */
 EXPORT i64 modt_cluster(const ClusterRules *rules, const StructureRules *structure, const PersonSize *person,
-                        const Cells *cells, const PointColumns *sampled, const float *beam_m, i64 n_cells,
-                        void *memory, i64 *cluster, const ClusterSizes *sizes)
+                        const PersonSize *hidden_person, const Cells *cells, const PointColumns *sampled,
+                        const float *beam_m, i64 n_cells, void *memory, i64 *cluster, const ClusterSizes *sizes)
 {
     ClusterScratch scratch, *s = &scratch;
     PROVEN(rules->coarse_side <= rules->fine_side);
@@ -875,14 +884,14 @@ EXPORT i64 modt_cluster(const ClusterRules *rules, const StructureRules *structu
     move_parts(cells, s, n_used, n_parts, cluster, sizes, &parts);
     n += n_parts;
 
-    /* 3. Parts before surfaces. */
+    /* 3. Parts before surfaces, and people behind them. */
     n_used = find_free_cells(rules, structure, person, cells, sampled, n_cells, cluster, sizes, n, s);
     if (!n_used)
         return n;
     n_parts = connect(cells, n_used, 0, rules->fine_side, s, s->part);
     parts = sizes_from(sizes, n);
     measure(cells, sampled, beam_m, s->part, n_used, n_parts, s, &parts);
-    find_leaving(rules, structure, person, n_used, cluster, sizes, n, &parts, n_parts, s);
+    find_leaving(rules, structure, person, hidden_person, n_used, cluster, sizes, n, &parts, n_parts, s);
     move_parts(cells, s, n_used, n_parts, cluster, sizes, &parts);
     return n + n_parts;
 }
@@ -930,7 +939,7 @@ EXPORT void modt_view_bounds(const Cells *cells, const PointColumns *sampled, co
 /* StripTuning: values by the names that they have there. */
 typedef struct {
     float max_diagonal_m, min_width_m, max_width_m, min_top_m, max_top_m, max_bottom_m;
-    float max_gap_m, min_gap_beams, max_gap_beams;
+    float max_gap_m, min_gap_beams, max_gap_beams, max_hidden_range_m;
 } StripRules;
 
 /* ViewBounds.width_m of strips a and b together, at the scale of a; b may be a */
@@ -957,13 +966,15 @@ static inline int may_be_person(const PersonSize *person, const ViewBounds *boun
 }
 
 /* Whether two strips that overlap in direction are a pair of strips.pairs; `near` is not farther than `far` */
-static int one_car(const StripRules *rules, const PersonSize *person, const ViewBounds *bounds, const float *beam_rad,
-                   i64 near, i64 far)
+static int one_car(const StripRules *rules, const PersonSize *person, const PersonSize *hidden_person,
+                   const ViewBounds *bounds, const float *beam_rad, i64 near, i64 far)
 {
     float gap_beams = (bounds->min[ELEVATION][far] - bounds->max[ELEVATION][near]) / beam_rad[far];
     return bounds->min[RANGE][far] - bounds->max[RANGE][near] < rules->max_gap_m && gap_beams > rules->min_gap_beams &&
            gap_beams < rules->max_gap_beams && !may_be_person(person, bounds, near) &&
-           !may_be_person(person, bounds, far) && fits(rules, bounds, near, far) &&
+           !may_be_person(person, bounds, far) &&
+           !(bounds->min[RANGE][far] < rules->max_hidden_range_m && may_be_person(hidden_person, bounds, far)) &&
+           fits(rules, bounds, near, far) &&
            width_of(bounds, near, far) > rules->min_width_m &&
            maxf(bounds->max[HEIGHT][near], bounds->max[HEIGHT][far]) > rules->min_top_m &&
            minf(bounds->min[HEIGHT][near], bounds->min[HEIGHT][far]) < rules->max_bottom_m;
@@ -972,9 +983,9 @@ static int one_car(const StripRules *rules, const PersonSize *person, const View
 /* merge_strips: first of the strips that make one car with each of n. `order` is that of their least directions,
  * in which the strips that overlap one in direction follow it. Scratch: `parent`, and the bounds of the cars, each
  * at its first. */
-EXPORT void modt_merge_strips(const StripRules *rules, const PersonSize *person, const ViewBounds *bounds,
-                              const float *beam_rad, i64 n, const i64 *order, i32 *parent, const ViewBounds *cars,
-                              i64 *target)
+EXPORT void modt_merge_strips(const StripRules *rules, const PersonSize *person, const PersonSize *hidden_person,
+                              const ViewBounds *bounds, const float *beam_rad, i64 n, const i64 *order, i32 *parent,
+                              const ViewBounds *cars, i64 *target)
 {
     for (i64 g = 0; g < n; g++)
         parent[g] = (i32)g;
@@ -985,7 +996,7 @@ EXPORT void modt_merge_strips(const StripRules *rules, const PersonSize *person,
             if (!(bounds->min[DIRECTION][b] <= bounds->max[DIRECTION][a]))
                 break;
             int swap = bounds->min[RANGE][b] < bounds->min[RANGE][a];
-            if (one_car(rules, person, bounds, beam_rad, swap ? b : a, swap ? a : b))
+            if (one_car(rules, person, hidden_person, bounds, beam_rad, swap ? b : a, swap ? a : b))
                 join(parent, (i32)a, (i32)b);
         }
     /* 2. Bounds of each car, from its first strip on, which comes before the others. */

@@ -120,7 +120,7 @@ enum { MAX_SAMPLE = 256 }; /* room for max_cells */
 typedef struct {
     double thickness_m, max_gap_m, min_length_m, min_filled, piece_gap, min_piece_m, beside_m, min_hanging;
     float min_base_m, min_extent_m, oversized_m, min_before_m, max_behind_m, min_across_m;
-    float max_bottom_m, min_part_extent_m, min_part_top_m, hanging_m, max_range_m;
+    float max_bottom_m, max_hidden_m, min_above_m, min_part_extent_m, min_part_top_m, hanging_m, max_range_m;
     i64 min_part_points;
     i32 max_lines, max_cells, min_cells, refinements;
 } StructureRules;

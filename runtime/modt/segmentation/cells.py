@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from modt.class_sizes import PersonSize
 from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.grids import FAR_M, Int32, PointColumns, SqrtRangeGrid
 from modt.segmentation.groups import Groups, consecutive, label_max, label_min
@@ -248,23 +249,25 @@ class CellClusterer:
         parts = ClusterSizes.of_cells(cells, sampled, beam_m, part)
         of_oversized = oversized.take(cluster.take(parts.cell))
         parts = replace(parts, of_oversized=of_oversized)
-        leaves = of_oversized | self._may_be_person(parts)
+        leaves = of_oversized | self._may_be_person(parts, self.split.person)
         cluster, sizes = moved(cells, cluster, sizes, part, parts, leaves)
 
         # 3. What stands before the long surfaces of the clusters that are left leaves them.
-        free, before_m = self._before_surfaces(cells, sampled, cluster, sizes)
+        free, before_m, surface_top_m = self._before_surfaces(cells, sampled, cluster, sizes)
         part = connect(self.fine, cells, max_gap_m, free)
         parts = ClusterSizes.of_cells(cells, sampled, beam_m, part)
         extent_m = sizes.extent_m.take(cluster.take(parts.cell))
-        return moved(cells, cluster, sizes, part, parts, self._leaves_surface(parts, part, before_m, extent_m))
+        leaves = self._leaves_surface(parts, part, before_m, surface_top_m.take(parts.cell), extent_m)
+        return moved(cells, cluster, sizes, part, parts, leaves)
 
     def _before_surfaces(
         self, cells: Cells, sampled: PointColumns, cluster: Int, sizes: ClusterSizes
-    ) -> tuple[Bool, Float32]:
-        """(C,) cells of long clusters that are on no surface, and (C,) distance of each before surfaces [m].
+    ) -> tuple[Bool, Float32, Float32]:
+        """(C,) cells of long clusters that are on no surface, distance of each before surfaces, and their top [m].
 
-        The distance is infinite where no surface reaches. Cells of clusters without a surface are not free, except
-        those below a canopy, which count as far before it.
+        The distance is infinite where no surface reaches. The top is that of all surfaces of the cluster of the cell,
+        infinite without any. Cells of clusters without a surface are not free, except those below a canopy, which
+        count as far before it.
         """
         tuning = self.structure
         tried = (sizes.points >= 2 * self.split.min_points) & (sizes.top_m > np.float32(self.split.person.min_top_m))
@@ -272,7 +275,7 @@ class CellClusterer:
         tried &= sizes.sqrt_range * sizes.sqrt_range < np.float32(tuning.max_range_m)
         n = int(np.count_nonzero(tried))
         free = np.zeros(len(cells), np.bool_)
-        before_m = np.full(len(cells), np.inf, np.float32)
+        before_m, surface_top_m = np.full((2, len(cells)), np.inf, np.float32)
         groups = Groups.from_labels(consecutive(tried).take(cluster), n)
         width_m = self.fine.step * sampled.sqrt_range.astype(np.float64)
         for members in np.split(groups.rows, groups.offsets[1:-1]) if n else ():
@@ -283,23 +286,28 @@ class CellClusterer:
             on_surface, distance_m = find_surfaces(x, y, width_m[rows], tuning)
             if on_surface.any():
                 before_m[rows] = distance_m
+                surface_top_m[rows] = cells.high[rows[on_surface]].max()
             elif canopy:
                 before_m[rows] = FAR_M  # finite: what stands below a canopy may leave it
             else:
                 continue
             free[rows] = ~on_surface
-        return free, before_m
+        return free, before_m, surface_top_m
 
-    def _leaves_surface(self, parts: ClusterSizes, part: Int, before_m: Float32, extent_m: Float32) -> Bool:
-        """(parts,) parts that leave their clusters, which have these extents [m].
+    def _leaves_surface(
+        self, parts: ClusterSizes, part: Int, before_m: Float32, surface_top_m: Float32, extent_m: Float32
+    ) -> Bool:
+        """(parts,) parts that leave their clusters.
 
-        Before a surface, or across it, are possible people and, if the cluster is oversized, what stands out. From
-        one that is longer than any object all leaves that stands out.
+        Before a surface, or across it, are possible people and, if the cluster is oversized, what stands out. Behind
+        it are possible people of whom it shows head and shoulders. From a cluster that is longer than any object all
+        leaves that stands out.
 
         Args:
             parts: sizes of the parts.
             part: (C,) part of each cell, or NONE.
             before_m: (C,) distance of each cell before surfaces [m].
+            surface_top_m: (parts,) greatest height of the surfaces of the cluster of each part [m].
             extent_m: (parts,) extent of the cluster of each part.
         """
         tuning = self.structure
@@ -311,13 +319,16 @@ class CellClusterer:
         across &= front_m - back_m > np.float32(tuning.min_across_m)
         before = (front_m > np.float32(tuning.min_before_m)) | across
         before &= back_m > -np.float32(tuning.max_behind_m)
-        person = self._may_be_person(parts) & (parts.bottom_m < np.float32(tuning.max_bottom_m))
+        person = self._may_be_person(parts, self.split.person) & (parts.bottom_m < np.float32(tuning.max_bottom_m))
+        behind = (front_m < 0) & (back_m > -np.float32(tuning.max_hidden_m))
+        behind &= parts.top_m > surface_top_m + np.float32(tuning.min_above_m)
+        hidden_person = self._may_be_person(parts, self.split.hidden_person) & behind
         stands_out = parts.points >= self.valid.min_part_points
         stands_out &= parts.top_m >= np.float32(self.valid.min_part_top_m)
         stands_out &= parts.extent_m >= np.float32(tuning.min_part_extent_m)
         oversized = extent_m >= np.float32(tuning.oversized_m)
         endless = extent_m >= np.float32(self.max_extent_m)
-        leaves: Bool = (before & (person | (oversized & stands_out))) | (endless & stands_out)
+        leaves: Bool = (before & (person | (oversized & stands_out))) | hidden_person | (endless & stands_out)
         return leaves
 
     def _may_hold_person(self, sizes: ClusterSizes) -> Bool:
@@ -327,9 +338,9 @@ class CellClusterer:
         may &= (sizes.points >= 2 * split.min_points) & (sizes.sqrt_range < self.max_split_sqrt_range)
         return may
 
-    def _may_be_person(self, sizes: ClusterSizes) -> Bool:
+    def _may_be_person(self, sizes: ClusterSizes, person: PersonSize) -> Bool:
         """(G,) parts of a person's size."""
-        fits = self.split.person.fits(sizes.extent_m, sizes.bottom_m, sizes.top_m)
+        fits = person.fits(sizes.extent_m, sizes.bottom_m, sizes.top_m)
         return (sizes.points >= self.split.min_points) & fits
 
 

@@ -237,6 +237,7 @@ class NativeKernels(NativeGeometryKernels, Kernels):
             self._structure(_cluster_rules, clusterer),
             self._structure(_structure_rules, clusterer),
             self._structure(PERSON_SIZE.of, clusterer.split.person),
+            self._structure(PERSON_SIZE.of, clusterer.split.hidden_person),
             CELLS.of(cells),
             POINT_COLUMNS.of(sampled),
             beam_m,
@@ -281,6 +282,7 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         self.library.modt_merge_strips(
             self._structure(STRIP_RULES.of, tuning),
             self._structure(PERSON_SIZE.of, tuning.person),
+            self._structure(PERSON_SIZE.of, tuning.hidden_person),
             VIEW_BOUNDS.of(bounds),
             beam_rad,
             n,

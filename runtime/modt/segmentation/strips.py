@@ -107,7 +107,9 @@ def pairs(bounds: ViewBounds, beam_rad: Float32, tuning: StripTuning) -> tuple[I
     adjacent = range_m[far] - bounds.max[RANGE][near] < tuning.max_gap_m
     adjacent &= (gap_beams > tuning.min_gap_beams) & (gap_beams < tuning.max_gap_beams)
     person = tuning.person.fits(bounds.width_m, bounds.min[HEIGHT], bounds.max[HEIGHT])
-    adjacent &= ~(person[near] | person[far])
+    hidden_person = tuning.hidden_person.fits(bounds.width_m, bounds.min[HEIGHT], bounds.max[HEIGHT])
+    hidden_person &= range_m < tuning.max_hidden_range_m
+    adjacent &= ~(person[near] | person[far] | hidden_person[far])
     near, far = near[adjacent], far[adjacent]
     a = bounds.take(near)
     b = bounds.take(far)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from modt.class_sizes import SPLIT_PERSON, STRIP_PERSON, PersonSize
+from modt.class_sizes import HIDDEN_PERSON, SPLIT_PERSON, STRIP_PERSON, PersonSize
 
 
 @dataclass(frozen=True)
@@ -173,6 +173,8 @@ class SplitTuning:
 
     person: PersonSize = SPLIT_PERSON
     """Size of a part that is split off."""
+    hidden_person: PersonSize = HIDDEN_PERSON
+    """Size of a part that is split off if it stands behind a surface."""
     min_extent_m: float = 0.8
     """Extent above which a cluster may hold a person and more [m]. Less divides single people.
     Chosen on: sensor study."""
@@ -276,6 +278,10 @@ class StructureTuning:
     max_bottom_m: float = 0.8
     """Greatest height of the bottom of a possible person before a surface [m]. More takes pillars of cars for
     people."""
+    max_hidden_m: float = 1.5
+    """Greatest distance behind a surface of a person whom it hides in part [m]."""
+    min_above_m: float = 0.25
+    """Least height of such a person above the surfaces [m]. Less takes the seats of cars for people."""
     min_part_extent_m: float = 0.2
     """Least extent of a part that stands out and is no possible person [m]. Less takes posts of fences."""
     hanging_m: float = 1.6
@@ -326,6 +332,10 @@ class StripTuning:
 
     person: PersonSize = STRIP_PERSON
     """Size of a strip that may be a person and is not merged; its extent is the width across the ray."""
+    hidden_person: PersonSize = HIDDEN_PERSON
+    """Size of the farther strip if it may be a person whom the nearer one hides."""
+    max_hidden_range_m: float = 20.0
+    """Range up to which it may be one [m]. More takes the roofs of far cars off, which few returns meet."""
     min_points: int = 2
     """Least number of points of a strip. Chosen on: KITTI scans thinned to fewer beams, as the values below."""
     visible_m: float = 1.5
