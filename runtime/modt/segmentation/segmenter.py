@@ -16,6 +16,7 @@ from modt.segmentation.ground import GroundEstimator, HeightEstimator
 from modt.segmentation.groups import HEADINGS, has_reflectance
 from modt.segmentation.kernels import NUMPY, Above, Bounds, Kernels
 from modt.segmentation.low import LowFinder
+from modt.segmentation.support import support_z_m
 from modt.segmentation.tuning import SegmentationTuning
 from modt.segmentation.view_ends import ViewEnds
 from modt.types import NONE, Bool, Cut, Float32, Float64, Int, Int8, PointKind, Proposals
@@ -95,7 +96,8 @@ class Segmenter:
         cut = self.ends.cut(members.columns[:3], members.offsets, box)
         if not self.fov.full:
             cut |= Cut.SIDE * np.concatenate([self._reach_end_of_margin(clusters) for clusters in parts])
-        mean = self.kernels.group_sums(members.columns, members.offsets) / np.diff(members.offsets)
+        count = np.diff(members.offsets)
+        mean = self.kernels.group_sums(members.columns, members.offsets) / count
         return Proposals(
             members=members.index,
             offsets=members.offsets,
@@ -103,7 +105,7 @@ class Segmenter:
             centroid=np.ascontiguousarray(mean[:3].T),
             box=box,
             cut=cut,
-            ground_z_m=mean[3],
+            ground_z_m=support_z_m(mean[3], box, count, self.tuning.support),
             reflectance=self._reflectance(points, members),
             kind=kind,
             feet=feet,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from modt.class_sizes import HIDDEN_PERSON, SPLIT_PERSON, STRIP_PERSON, PersonSize
+from modt.class_sizes import HIDDEN_PERSON, RAISED_PERSON, SPLIT_PERSON, STRIP_PERSON, PersonSize
 
 
 @dataclass(frozen=True)
@@ -363,6 +363,23 @@ class StripTuning:
 
 
 @dataclass(frozen=True)
+class SupportTuning:
+    """People who stand on a platform, whose top is no ground.
+
+    Chosen on: simulated platforms, with a check on simulated streets.
+    """
+
+    person: PersonSize = RAISED_PERSON
+    """Size of a proposal that may be such a person."""
+    min_step_m: float = 0.3
+    """Least height of its lowest point above the ground [m]. Lower platforms hardly matter."""
+    max_step_m: float = 1.4
+    """Greatest height of its lowest point above the ground [m]: the edge of a platform hides feet. More are signs."""
+    min_points: int = 20
+    """Points from which a proposal may be such a person. With fewer, far poles and branches are called people."""
+
+
+@dataclass(frozen=True)
 class ViewTuning:
     """Edge of a limited field of view. Chosen on: KITTI scans within the camera's view."""
 
@@ -424,6 +441,7 @@ class SegmentationTuning:
     structure: StructureTuning = StructureTuning()
     heads: HeadTuning = HeadTuning()
     strips: StripTuning = StripTuning()
+    support: SupportTuning = SupportTuning()
     view: ViewTuning = ViewTuning()
     heading: HeadingTuning = HeadingTuning()
     view_ends: ViewEndTuning = ViewEndTuning()

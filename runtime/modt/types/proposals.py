@@ -54,7 +54,7 @@ class Proposals:
     centroid: Float64  # (P, 3) mean of each proposal's points [m, sensor frame]
     box: Float64  # (P, 7) minimum box: x, y, z of its centre, l, w, h [m], yaw [rad], sensor frame, l >= w
     cut: Int  # (P,) flags of Cut
-    ground_z_m: Float64 | None = None  # (P,) z of the ground beneath each [m, sensor frame], None where not known
+    ground_z_m: Float64 | None = None  # (P,) z of what each stands on [m, sensor frame], None where not known
     reflectance: Float64 | None = None  # (P, 5)
     kind: Int8 | None = None  # (N,) PointKind of each point of the frame, None where not known
     feet: Int | None = None  # (2, F) points of kind FOOT, and of each a point of what it belongs to
