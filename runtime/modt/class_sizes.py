@@ -41,13 +41,13 @@ class PersonSize:
 
     max_extent_m: float
     """Greatest extent seen from above [m]. Less takes people in stride for other things.
-    Chosen on: sensor study for parts, KITTI scans thinned to fewer beams for strips."""
+    Chosen on: sensor study for parts, thinned KITTI scans for strips, posed people for who is hidden or raised."""
     min_height_m: float
     """Least height of the visible part [m]. Less takes bags and strips of cars for people.
-    Chosen on: sensor study for parts, KITTI scans thinned to fewer beams for strips."""
+    Chosen on: sensor study for parts, thinned KITTI scans for strips, posed people for who is hidden or raised."""
     min_top_m: float = -np.inf
     """Least height of the top above the ground [m]. More misses children.
-    Chosen on: sensor study for parts, KITTI scans thinned to fewer beams for strips."""
+    Chosen on: sensor study for parts, thinned KITTI scans for strips, posed people for who is hidden or raised."""
     max_top_m: float = np.inf
     """Greatest height of the top above the ground [m]. Less misses tall people on a kerb.
     Chosen on: sensor study."""

@@ -7,7 +7,7 @@ import pytest
 
 from modt.classes import ObjectClass
 from modt_simulation.movers import MAKERS
-from modt_simulation.obstacles import GAPS_M
+from modt_simulation.obstacles import COVERS, GAPS_M, PLATFORMS_M
 from modt_simulation.postures import NEAR_M, RINGS_M, people
 from modt_simulation.synthetic_stream import SyntheticStream
 from tests.modt_simulation.test_stream import heights_of
@@ -98,6 +98,36 @@ def test_people_in_postures_are_on_the_rings_and_as_tall_as_they_are_said_to_be(
     assert set(tops) == {*people(np.random.default_rng(0)), "at arm's length"}
     assert np.max(tops["lies"]) < 0.5
     assert 0.7 < np.median(tops["crouches"]) < np.median(tops["kneels"]) < 1.5 < np.median(tops["stands"])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_who_is_hidden_stands_or_walks_right_behind_the_cover(seed):
+    world = world_of("hidden", seed)
+    places = [np.array(body.path.at(2.0)[:2]) for body in world.bodies if not body.kind.name]
+    people = [body for body in world.bodies if body.role]
+    assert people
+    for person in people:
+        cover = COVERS[person.role.removeprefix("behind a ")]
+        place = np.array(person.path.at(2.0)[:2])  # half way along a walk, in the middle behind the cover
+        nearest = min(places, key=lambda other: np.hypot(*(place - other)))
+        behind_m = np.hypot(*place) - np.hypot(*nearest)
+        assert behind_m == pytest.approx(np.hypot(*(place - nearest)))
+        assert 0.35 <= behind_m - cover.depth_m / 2 <= 1.2
+
+
+def test_people_on_a_platform_are_as_high_as_it_is_said_to_be():
+    heights_m = set()
+    for seed in range(16):
+        world = world_of("platform", seed)
+        people = [body for body in world.bodies if body.role]
+        (role,) = {body.role for body in people}
+        at = np.array([body.path.at(0.0)[:2] for body in people])
+        height_m = float(role.split()[-2])
+        assert world.terrain.heights(*at.T) == pytest.approx(height_m, abs=0.04)
+        assert world.terrain.heights(np.zeros(1), np.zeros(1)) == pytest.approx(0.0, abs=0.04)
+        heights_m.add(height_m)
+    assert len(heights_m) > 3
+    assert heights_m <= set(PLATFORMS_M)
 
 
 def test_stairs_rise_ahead_and_fall_to_the_right():

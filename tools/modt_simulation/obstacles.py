@@ -33,6 +33,8 @@ SHOULDER_M = 0.3
 """Half the breadth of a person."""
 BACK_M = 0.2
 """Half the depth of a person."""
+PLATFORMS_M = (0.15, 0.3, 0.45, 0.6, 0.9)
+"""Heights of platforms."""
 STEEPEST = 1.0
 """Tangent of the rays that may meet hills and stairs."""
 RISER_M, TREAD_M = 0.17, 0.3
@@ -283,7 +285,8 @@ def hidden(rng: Generator, seconds: float, height_m: float) -> World:
         along = np.array([np.cos(bearing), np.sin(bearing)])
         across = np.array([-along[1], along[0]])
         distance = rng.uniform(2.5, 9.0)
-        builder.scenery(cover.solids(rng), *(distance * along).tolist(), bearing)
+        x, y = (distance * along).tolist()
+        builder.scenery(cover.solids(rng), x, y, bearing)
         middle = (distance + cover.depth_m / 2 + rng.uniform(0.35, 1.2)) * along
         speed = rng.uniform(0.5, 1.4) * rng.integers(2)
         way = rng.choice((-0.5, 0.5)) * speed * seconds * across
@@ -291,9 +294,31 @@ def hidden(rng: Generator, seconds: float, height_m: float) -> World:
         if speed:
             builder.walker([middle - way, middle + way], speed, role=role)
         else:
-            builder.pedestrian(Path.standing(*middle.tolist(), rng.uniform(-np.pi, np.pi)), role=role)
+            x, y = middle.tolist()
+            builder.pedestrian(Path.standing(x, y, rng.uniform(-np.pi, np.pi)), role=role)
     enclose(builder, (18.0, 18.0), 3.0)
     return _level(builder, Material.PAVING, height_m, 0.0)
+
+
+def platform(rng: Generator, seconds: float, height_m: float) -> World:
+    """People who stand and walk on a platform along the way, which is as high as a pavement, a stage or a dock."""
+    builder = SceneBuilder(rng, seconds)
+    platform_m = float(rng.choice(PLATFORMS_M))
+    edge = rng.uniform(2.0, 4.0)
+    builder.scenery(block((50.0, 0.3, 3.0 + platform_m), Material.WALL), 0.0, edge + rng.uniform(4.5, 8.5))
+    for x in np.arange(-12.0, 13.0, 3.0) + rng.uniform(-1.0, 1.0, 9):
+        y = edge + rng.uniform(0.4, 3.5)
+        role = f"on a platform of {platform_m:g} m"
+        if rng.random() < 0.5:
+            builder.pedestrian(Path.standing(x, y, rng.uniform(-np.pi, np.pi)), role=role)
+        else:
+            builder.walker([(x, y), (x + rng.choice((-REACH_M, REACH_M)), y)], rng.uniform(0.6, 1.4), role=role)
+
+    def height(x: Float64, y: Float64) -> Float64:
+        level: Float64 = np.where(y > edge, platform_m, 0.0) + np.zeros_like(x)
+        return level
+
+    return _world(builder, _uneven(rng, height, 0.1, 0.006, Material.PAVING), height_m)
 
 
 def _around(rng: Generator, nearest_m: float, farthest_m: float) -> tuple[float, float, float]:

@@ -25,6 +25,7 @@ from modt_simulation.obstacles import (
     hills,
     loading,
     movers,
+    platform,
     scooters,
     stairs,
     vines,
@@ -46,7 +47,22 @@ SCENES = {
     scene.__name__: scene
     for scene in (
         *(street, crossing, yard, crowd, ramp, dock, hall, corridor, lobby, lift, warehouse, carpark),
-        *(wall, grass, hedges, vines, scooters, hills, heaps, stairs, movers, loading, postures, hidden, clutter),
+        *(
+            wall,
+            grass,
+            hedges,
+            vines,
+            scooters,
+            hills,
+            heaps,
+            stairs,
+            movers,
+            loading,
+            postures,
+            hidden,
+            platform,
+            clutter,
+        ),
     )
 }
 """Scene by name: the world by a random generator, a duration [s] and the height of the sensor [m]."""

@@ -46,6 +46,15 @@ def judged(group_of_body, reported=ObjectClass.PEDESTRIAN, cut=0):
     return {row[0]: row[1:] for row in rows_of_roles([drive])}, row_of_place([drive])
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("scene", "seed"), [("hidden", 901), ("platform", 902), ("platform", 904)])
+def test_people_who_are_hidden_or_raised_are_recalled(scene, seed):
+    drive = run(SyntheticStream(scene, "vlp-16", 1.0, seed, height_m=0.8), "accurate")
+    seen = sum(role.seen for role in drive.roles.values())
+    assert seen >= 10
+    assert sum(role.recalled for role in drive.roles.values()) > 0.8 * seen
+
+
 def annotated(world):
     return np.array([bool(body.kind.name) for body in world.bodies])
 
