@@ -37,8 +37,8 @@ def judge(frame: JudgedFrame, rules: Rules, drive: int = 0, points: ObjectPoints
     overlap = Overlap.of(frame, points)
     objects = _objects(frame, overlap, rules)
     # (n,) whether the best proposal of each object stands for it
-    pairs = overlap.iou > 0.5 if rules.by_iou else overlap.most_of_object & overlap.most_of_proposal
-    proposals = _proposals(frame, overlap, objects, pairs, rules)
+    has_match = overlap.iou > 0.5 if rules.by_iou else overlap.most_of_object & overlap.most_of_proposal
+    proposals = _proposals(frame, overlap, objects, has_match, rules)
     proposals["track"] = NONE
     proposals["reported"] = NONE
     proposals["track"][frame.of_track] = frame.track
@@ -49,7 +49,7 @@ def judge(frame: JudgedFrame, rules: Rules, drive: int = 0, points: ObjectPoints
         rows["frame"] = frame.index
     best = proposals[overlap.best]
     objects["reported"] = np.where(objects["outcome"] == Outcome.DETECTED, best["reported"], NONE)
-    objects["reported_by_match"] = np.where(pairs, best["reported"], NONE)
+    objects["reported_by_match"] = np.where(has_match, best["reported"], NONE)
     objects["track"] = np.where(overlap.most > 0, best["track"], NONE)
     objects["reported_by_best"] = np.where(overlap.most_of_proposal & (overlap.most > 0), best["reported"], NONE)
     tracked = np.isin(np.arange(len(proposals)), frame.of_track)
@@ -115,7 +115,7 @@ def _outcome(overlap: Overlap) -> Int:
     return np.select([*conditions.values()], [*map(int, conditions)], int(Outcome.PARTIAL))
 
 
-def _proposals(frame: JudgedFrame, overlap: Overlap, objects: Rows, pairs: Bool, rules: Rules) -> Rows:
+def _proposals(frame: JudgedFrame, overlap: Overlap, objects: Rows, has_match: Bool, rules: Rules) -> Rows:
     """The rows of all proposals, by (n,) whether the best proposal of each object stands for it."""
     truth = frame.truth
     size = overlap.size
@@ -123,7 +123,7 @@ def _proposals(frame: JudgedFrame, overlap: Overlap, objects: Rows, pairs: Bool,
     proposal_of_point = frame.proposal[members]
     points = frame.points[members]
 
-    matched = objects["to_classify"] & pairs
+    matched = objects["to_classify"] & has_match
     standing_for = overlap.best[matched]
     label = np.zeros(len(size), np.int64)
     label[standing_for] = truth.object_class[matched]
@@ -152,7 +152,7 @@ def _proposals(frame: JudgedFrame, overlap: Overlap, objects: Rows, pairs: Bool,
 
 
 def _in_boxes(truth: FrameTruth, overlap: Overlap) -> tuple[Int, Int]:
-    """(P,) class and role of the object in whose box each proposal lies, the last one of several."""
+    """(P,) class and role of the object in whose box most of each proposal lies, the last one of several."""
     box_class = np.zeros(len(overlap.size), np.int64)
     role = np.full(len(overlap.size), Role.COUNTED, np.int64)
     held = overlap.held > 0.5 * overlap.size

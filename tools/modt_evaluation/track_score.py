@@ -26,7 +26,7 @@ class Length:
 
     objects: int  # objects counted
     frames: int  # frames counted, summed over the objects
-    life: float | None  # frames followed / (objects + discontinuities)
+    life: float | None  # the length: frames followed / (objects + discontinuities)
     ideal: float | None  # frames / objects
     ratio: float | None  # life / ideal
 
@@ -50,7 +50,7 @@ class TrackScore:
     labelled: Length  # over all labelled frames, whatever points the object has there; Table III gives this ideal
     followed: float | None  # share of the frames in which an object is followed
     discontinuities: int  # times that another track than before follows an object
-    taken_over: int  # number of these by an existing track of something else
+    taken_over: int  # number of these by a track that existed before and had not followed the object
     returned: int  # number of these by a track that had followed the object before
     mis_associations: int  # tracks that follow more than one object for MIN_FRAMES_FOLLOWED frames or more each
 

@@ -109,7 +109,10 @@ class LoadShedding:
 
 
 def budget_at(step: Step, budget: Budget, left_ms: float, frame: int) -> Budget:
-    """Budget of a frame at a step, from the budget of the profile and the time left to the deadline [ms]."""
+    """Budget of a frame at a step, from the budget of the profile and the time left to the deadline [ms].
+
+    The time left does not limit the few calls of deferred classification, which would else never be made.
+    """
     if step >= Step.DEFERRED:
         calls = 1 if frame % DEFERRED_EVERY == 0 else 0
         return replace(budget, calls=calls if budget.calls is None else min(calls, budget.calls))

@@ -57,7 +57,7 @@ REPORT_S = 1.0
 class Loop:
     """Drives the stages by the frames of a source. As it is, it replays a recording by a Playback.
 
-    Service narrows the source to a LiveStream, and adds what a robot needs.
+    Service narrows the source to a live one, and adds what a robot needs.
 
     Attributes:
         source, stages, recording: give the frames, process them, and keep the records.
@@ -239,17 +239,17 @@ class Loop:
         self.stages.read = self.summary["read"]
         self.failures.contain("status", self._finish_status)
         self.recording.end(self._last_documents)
-        self._account_for(self.recording.health())
+        self._correct_status(self.recording.health())
 
     def _finish_status(self) -> None:
         """Add the last status to the summary. A replay has none."""
 
-    def _account_for(self, recording: RecordingHealth) -> None:
+    def _correct_status(self, recording: RecordingHealth) -> None:
         """Correct the last status by the final counts of the records."""
 
     def _last_documents(self, recording: RecordingHealth) -> dict[str, str]:
         """Documents beside the records, by their names, given the final counts of these."""
-        self._account_for(recording)
+        self._correct_status(recording)
         return {SUMMARY: json.dumps(self.summary, indent=2, default=fields_of) + "\n"}
 
 
@@ -329,7 +329,7 @@ class Service(Loop):
         for name in ("status", "metrics"):
             self.writers[name].close()
 
-    def _account_for(self, recording: RecordingHealth) -> None:
+    def _correct_status(self, recording: RecordingHealth) -> None:
         if "status" in self.summary:
             self.summary["status"] = replace(self.summary["status"], recording=recording)
 

@@ -102,7 +102,7 @@ class LinearCost:
             self._starved = 0
 
     def record_starved_frame(self) -> None:
-        """Add a frame that allowed none of the calls asked for."""
+        """Add a frame whose whole budget is below the estimate of its first call."""
         self._adapt_margin(underestimated=False)
         self._starved += 1
 

@@ -72,27 +72,27 @@ def _assumed_log_odds(log_frequency: bytes) -> Float64:
 
 
 def log_pool(
-    network: Float64, log_box: Float64, reflectance: Float64, log_frequency: Float64, weights: PoolWeights
+    network: Float64, log_box: Float64, log_reflectance: Float64, log_frequency: Float64, weights: PoolWeights
 ) -> Float64:
     """(R, C) logarithm of the pool, up to a constant.
 
     Args:
         network: (R, C) P(class | points) of the network.
         log_box: (R, C) log P(class | box), up to a constant a row.
-        reflectance: (R, C) log P(reflectance | class, box), up to a constant a row.
+        log_reflectance: (R, C) log P(reflectance | class, box), up to a constant a row.
         log_frequency: (C,) log of the frequencies of the classes that network and box assume.
         weights: exponents of the three.
     """
     score = pooled_prior(log_box, log_frequency, weights.box)
     score += weights.network * (np.log(np.maximum(network, _MIN_PROBABILITY)) - log_frequency)
     if weights.reflectance:
-        score += weights.reflectance * reflectance
+        score += weights.reflectance * log_reflectance
     return score
 
 
 def softmax(log_probability: Float64) -> Float64:
     """(R, C) probabilities whose logarithms are given up to a constant a row."""
     by_class = log_probability.T.copy()  # arithmetic along axes of so few would be slow
-    likelihood = np.exp(by_class - by_class.max(axis=0))
-    probability: Float64 = (likelihood / likelihood.sum(axis=0)).T
+    relative = np.exp(by_class - by_class.max(axis=0))
+    probability: Float64 = (relative / relative.sum(axis=0)).T
     return probability

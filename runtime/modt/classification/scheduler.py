@@ -127,6 +127,7 @@ class Scheduler:
         """(R,) worth of a call for these tracks.
 
         It is the weighted sum of uncertainty, nearness and novelty, each 0 to 1, plus the weighted frames waited.
+        Novelty is the relative change of the number of points since the last view.
         """
         tuning = self._tuning
         proposal_of_row = motion.proposal[rows]
@@ -145,9 +146,9 @@ class Scheduler:
         return value
 
     def _grant(self, points: Int, budget: Budget) -> Bool:
-        """Grant the calls that the budget pays for: (R,), of calls for (R,) points by decreasing worth.
+        """(R,) calls that the budget pays for, of calls for (R,) points by decreasing worth.
 
-        The mean budget of the frame is saved first. A frame in which no call fits may be counted (`_try_exception`).
+        Call once a frame: its mean budget is saved first, and a starved frame is counted (`_try_exception`).
         """
         if budget.mean_ms is not None:
             self._savings.add(budget.mean_ms)

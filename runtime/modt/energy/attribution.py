@@ -1,6 +1,6 @@
 """Attribution of energy to idling and the stages. Reports, pages and the status all split energy by this rule.
 
-A board is described by E_window = P_idle T + e_seg N_seg + e_class N_class + e_point N_point.
+A board is described by the keys of its profile: E_window = idle_W T + seg_J N_seg + class_J N_class + point_J N_points.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ def usable(window: EnergyWindow) -> bool:
 def attribute(window: EnergyWindow, board: EnergyConfig) -> dict[str, float]:
     """Energy of idling, of each stage, and of the unattributed rest of a window [J], or nothing without a reading.
 
-    With P_idle of the board, E and T of the window and t of its CPU time, in all and of a stage,
+    With the energy E, the length T and the CPU time t of the window, of which each stage took t_stage,
 
-        E_idle = min(P_idle T, E)
+        E_idle = min(idle_W T, E)
         E_stage = (E - E_idle) t_stage / t
 
-    A reading of a calibrated board is split by the coefficients instead: E_idle = P_idle T,
-    E_segmentation = e_seg N_seg, E_classification = e_class N_class + e_point N_point, the rest is unattributed.
+    A reading of a calibrated board is split by the coefficients instead: E_idle = idle_W T,
+    E_segmentation = seg_J N_seg, E_classification = class_J N_class + point_J N_points, the rest is unattributed.
     The parts sum to E.
     """
     energy_J = window.energy_J

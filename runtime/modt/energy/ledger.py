@@ -132,7 +132,10 @@ class Ledger:
         self._stages = defaultdict(StageWork)
 
     def _measure_overhead(self) -> tuple[int, int]:
-        """Cost of a span beyond the timed call, and of a frame beyond its spans [ns], the least of the rounds."""
+        """CPU time of a span beyond the timed call, and of a frame beyond its spans [ns], the least of the rounds.
+
+        It counts as wall time: unlike that, it does not grow while other processes run.
+        """
         span_ns = []
         frame_ns = []
         for _ in range(ROUNDS):

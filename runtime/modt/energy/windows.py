@@ -87,8 +87,8 @@ class Windows:
         self._clocks = clocks
         self._conditions = conditions
         self._min_s = min_s
-        counts = any(meter.facts.kind is Kind.MEASURED for meter in meters)
-        self._least_s = min(PRIMING_S, min_s) if counts else min_s
+        has_counter = any(meter.facts.kind is Kind.MEASURED for meter in meters)
+        self._least_s = min(PRIMING_S, min_s) if has_counter else min_s
         self._index = 0
         for k in range(len(meters)):
             self._read(k, 0.0)

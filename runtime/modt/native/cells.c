@@ -129,7 +129,7 @@ static ALWAYS_INLINE float columns_at(float rays_sqrt_range, float sqrt_range)
 typedef struct {
     i32 side, first;                     /* cells of a side; row and column of the first in the grid */
     i32 *returns SHAPE(side, side);      /* points of each cell, 0 of an empty one */
-    float *low, *high SHAPE(side, side); /* least and greatest height in each [m], infinite and -infinite of an empty one */
+    float *low, *high SHAPE(side, side); /* least and greatest height in each [m]; infinities of an empty one */
     float *solidity SHAPE(side, side);   /* 0 of an empty one */
 } NearCells;
 
@@ -157,7 +157,8 @@ static ALWAYS_INLINE float window_solidity(const NearCells *near, i32 at, float 
 /* PorosityFinder.air of n cells: returns the number of returns in airborne cells, of the number looked at, which is
  * written. Scratch: `place`, (n,). */
 EXPORT i64 modt_air(const PorosityRules *r, const NearCells *near, const Cells *cells, const float *sqrt_range,
-                    const float *beam_m, float rays_sqrt_range, i32 n, i32 *place, float *solidity, uint8_t *airborne, i64 *looked_at)
+                    const float *beam_m, float rays_sqrt_range, i32 n, i32 *place, float *solidity, uint8_t *airborne,
+                    i64 *looked_at)
 {
     for (i32 c = 0; c < n; c++) {
         i32 at = place[c] = near_place(near, cells, c);
@@ -275,7 +276,8 @@ EXPORT void modt_airborne_points(const PorosityRules *r, const Grid *grid, const
         if (airborne[c] || !(sqrt_range[c] < r->point_sqrt_range))
             continue;
         float reach_m = maxf(r->reach_m, r->reach_beams * beam_m[c]);
-        float enough = r->min_solidity * columns_at(rays_sqrt_range, sqrt_range[c]) * (2.0f * reach_m / beam_m[c] + 1.0f);
+        float columns = columns_at(rays_sqrt_range, sqrt_range[c]);
+        float enough = r->min_solidity * columns * (2.0f * reach_m / beam_m[c] + 1.0f);
         i32 n_around = cells_around(&map, place[c], around);
         for (i32 k = first[c]; k < first[c + 1]; k++) {
             i32 count = 0;
@@ -311,7 +313,8 @@ EXPORT i64 modt_without(const i64 *rows, const PointColumns *points, const float
 /* low_points: places of what may be low things or feet, and of a tall point beside each, or NONE; returns how many
  * there are. `sqrt_range` and `sample` are those of the tall cells. Scratch: `is_left_over`, of these.
  *
- * In the table stands what is in each wide cell: the place of a tall point, NONE, or CLEAR for a low point only. */
+ * In the table stands what is in each wide cell: the place of a tall point, CLEAR if there is none but a low point
+ * that is clear of the ground, else NONE. */
 EXPORT i64 modt_low_points(const Grid *grid, const PointColumns *points, const uint8_t *is_clear, const Clusters *tall,
                            const Cells *cells, const float *sqrt_range, const i64 *sample, i64 n_low,
                            float max_sqrt_range, uint8_t *is_left_over, i64 *places, i64 *beside)
@@ -440,9 +443,9 @@ typedef struct {
     double *x, *y, *width_m;        /* (n,) these cells, as find_surfaces takes them */
     uint8_t *on_surface;            /* (n,) its results */
     double *distance_m;             /* (n,) */
-    uint8_t *is_free;               /* (n,) whether a cell is on no surface of a cluster with one */
-    float *before_m;                /* (n,) distance of such a cell before surfaces, infinite without */
-    float *surface_top_m;           /* (n,) greatest height of the surfaces of its cluster, infinite without */
+    uint8_t *is_free;               /* (n,) whether a cell of a cluster with surfaces, or below a canopy, is on none */
+    float *before_m;                /* (n,) distance of a free cell before surfaces, infinite where none reaches */
+    float *surface_top_m;           /* (n,) greatest height of the surfaces of its cluster, infinite without any */
     float *front_m, *back_m;        /* (n,) greatest and least of those of each part */
     SurfaceScratch surface;
 } ClusterScratch;
@@ -562,9 +565,9 @@ static i32 unite_cells(const Cells *cells, i64 n_used, i32 side, const ClusterSc
  * earlier rows, or 0; their places tell that they are no neighbours.
  *
  * A span becomes the child of the least of itself and an ancestor of each neighbour that it is connected with. Any
- * ancestor is of the same component. The second one, the parent's parent, is mostly the root, so that mostly all are the
- * same, and no trees have to be joined. Apart from the joins there are no branches, since no processor foresees which
- * neighbours there are. */
+ * ancestor is of the same component. The second one, the parent's parent, is mostly the root, so that mostly all are
+ * the same, and no trees have to be joined. Apart from the joins there are no branches, since no processor foresees
+ * which neighbours there are. */
 static void find_components(const Span *spans, i32 n, i32 side, i32 *latest, i32 *parent)
 {
     const i4 back = {1, side + 1, side, side - 1}; /* from the place of a span to those of its neighbours */
@@ -630,8 +633,8 @@ static i64 number_components(i64 n_used, i32 n, const ClusterScratch *s, i64 *co
     return count;
 }
 
-/* connect, with a shift of 0, and connect_coarse, with 1. Labels each used cell, by rank, with the component of its cell
- * on the grid 2^shift times as coarse (side * side). Returns how many components there are.
+/* connect, with a shift of 0, and connect_coarse, with 1. Labels each used cell, by rank, with the component of its
+ * cell on the grid 2^shift times as coarse (side * side). Returns how many components there are.
  *
  * Cells and components keep their order outside. Inside, spans are in the order of the grid, in which neighbours lie
  * side by side in memory. */
@@ -741,7 +744,7 @@ static void move_parts(const Cells *cells, const ClusterScratch *s, i64 n_used, 
 
 /* CellClusterer._before_surfaces, of n clusters: uses the cells that are free, and sets their `before_m` and
  * `surface_top_m`. Returns how many they are. */
-static i64 find_free_cells(const ClusterRules *rules, const StructureRules *surfaces, const PersonSize *person,
+static i64 find_free_cells(const ClusterRules *rules, const StructureRules *structure, const PersonSize *person,
                            const Cells *cells, const PointColumns *sampled, i64 n_cells, const i64 *cluster,
                            const ClusterSizes *sizes, i64 n, const ClusterScratch *s)
 {
@@ -749,8 +752,8 @@ static i64 find_free_cells(const ClusterRules *rules, const StructureRules *surf
     i32 *const next = s->next_of_cluster, rows = 0;
     for (i64 g = 0; g < n; g++) {
         int tried = sizes->points[g] >= 2 * rules->min_points && sizes->top_m[g] > person->min_top_m &&
-                    sizes->extent_m[g] >= surfaces->min_extent_m &&
-                    sizes->sqrt_range[g] * sizes->sqrt_range[g] < surfaces->max_range_m;
+                    sizes->extent_m[g] >= structure->min_extent_m &&
+                    sizes->sqrt_range[g] * sizes->sqrt_range[g] < structure->max_range_m;
         next[g] = tried ? 0 : NONE;
     }
     i64 n_tried = 0, n_free = 0;
@@ -777,11 +780,11 @@ static i64 find_free_cells(const ClusterRules *rules, const StructureRules *surf
             continue;
         i32 end = next[g], hanging = 0, m = 0;
         for (i32 k = start; k < end; k++)
-            hanging += cells->low[s->cell_of_row[k]] > surfaces->hanging_m;
-        int canopy = hanging >= surfaces->min_hanging * (end - start);
+            hanging += cells->low[s->cell_of_row[k]] > structure->hanging_m;
+        int canopy = hanging >= structure->min_hanging * (end - start);
         for (i32 k = start; k < end; k++) {
             i32 i = s->cell_of_row[k];
-            if (canopy && cells->low[i] > surfaces->hanging_m)
+            if (canopy && cells->low[i] > structure->hanging_m)
                 continue;
             s->row_cells[m] = i;
             s->x[m] = sampled->x[i];
@@ -789,7 +792,7 @@ static i64 find_free_cells(const ClusterRules *rules, const StructureRules *surf
             s->width_m[m++] = rules->step * sampled->sqrt_range[i];
         }
         start = end;
-        i64 found = find_surfaces(surfaces, s->x, s->y, s->width_m, m, &s->surface, s->on_surface, s->distance_m);
+        i64 found = find_surfaces(structure, s->x, s->y, s->width_m, m, &s->surface, s->on_surface, s->distance_m);
         if (!found && !canopy)
             continue;
         float top_m = found ? -INFINITY : INFINITY;
@@ -811,7 +814,7 @@ static i64 find_free_cells(const ClusterRules *rules, const StructureRules *surf
 }
 
 /* CellClusterer._leaves_surface: sets `cluster_of_part` of those that leave, which are numbered from n on. */
-static void find_leaving(const ClusterRules *rules, const StructureRules *surfaces, const PersonSize *person,
+static void find_leaving(const ClusterRules *rules, const StructureRules *structure, const PersonSize *person,
                          const PersonSize *hidden_person, i64 n_used, const i64 *cluster, const ClusterSizes *sizes,
                          i64 n, const ClusterSizes *parts, i64 n_parts, const ClusterScratch *s)
 {
@@ -827,19 +830,20 @@ static void find_leaving(const ClusterRules *rules, const StructureRules *surfac
         s->front_m[p] = maxf(before_m, s->front_m[p]);
         s->back_m[p] = minf(before_m, s->back_m[p]);
     }
-    const float thickness_m = (float)surfaces->thickness_m;
+    const float thickness_m = (float)structure->thickness_m;
     for (i64 p = 0; p < n_parts; p++) {
         float front_m = s->front_m[p], back_m = s->back_m[p];
         float extent_m = sizes->extent_m[cluster[parts->cell[p]]];
-        int across = back_m < -thickness_m && front_m > -thickness_m && front_m - back_m > surfaces->min_across_m;
-        int before = (front_m > surfaces->min_before_m || across) && back_m > -surfaces->max_behind_m;
-        int possible = may_be_person_part(rules, person, parts, p) && parts->bottom_m[p] < surfaces->max_bottom_m;
-        int stands_out = parts->points[p] >= surfaces->min_part_points && parts->top_m[p] >= surfaces->min_part_top_m &&
-                         parts->extent_m[p] >= surfaces->min_part_extent_m;
-        int hidden = front_m < 0 && back_m > -surfaces->max_hidden_m &&
-                     parts->top_m[p] > s->surface_top_m[parts->cell[p]] + surfaces->min_above_m &&
+        int across = back_m < -thickness_m && front_m > -thickness_m && front_m - back_m > structure->min_across_m;
+        int before = (front_m > structure->min_before_m || across) && back_m > -structure->max_behind_m;
+        int possible = may_be_person_part(rules, person, parts, p) && parts->bottom_m[p] < structure->max_bottom_m;
+        int stands_out = parts->points[p] >= structure->min_part_points &&
+                         parts->top_m[p] >= structure->min_part_top_m &&
+                         parts->extent_m[p] >= structure->min_part_extent_m;
+        int hidden = front_m < 0 && back_m > -structure->max_hidden_m &&
+                     parts->top_m[p] > s->surface_top_m[parts->cell[p]] + structure->min_above_m &&
                      may_be_person_part(rules, hidden_person, parts, p);
-        int leaves = (before && (possible || (extent_m >= surfaces->oversized_m && stands_out))) || hidden ||
+        int leaves = (before && (possible || (extent_m >= structure->oversized_m && stands_out))) || hidden ||
                      (extent_m >= rules->max_extent_m && stands_out);
         s->cluster_of_part[p] = leaves ? (i32)(n + p) : NONE;
     }

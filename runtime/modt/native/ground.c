@@ -134,8 +134,8 @@ static void place_points(const Ground *g, const u4 *points, i64 n, float *restri
     }
 }
 
-/* GroundEstimator._lowest and the highest returns of GroundEstimator.heights, of up to BLOCK points. Afterwards the cell of points out of
- * bounds of range, and of places of the block without a point, is the one after the last. */
+/* GroundEstimator._lowest and the highest returns of GroundEstimator.heights, of up to BLOCK points. Afterwards the
+ * cell of points out of bounds of range, and of places of the block without a point, is the one after the last. */
 static void find_ends(const Ground *g, float height_m, i64 n, const float *z, const float *sqrt_range, i32 *cell,
                       float (*ends)[2])
 {
@@ -164,7 +164,7 @@ static void find_ends(const Ground *g, float height_m, i64 n, const float *z, co
             of_cell[0] = minf(candidate[i][0], of_cell[0]);
             of_cell[1] = minf(candidate[i][1], of_cell[1]);
         }
-    /* 3. Points out of bounds count above, and are left out from here on. */
+    /* 3. Points out of bounds of range have counted in steps 1 and 2, and are left out from here on. */
     for (i64 i = 0; i < n; i++) {
         int used = (sqrt_range[i] > g->min_sqrt_range) & (sqrt_range[i] < g->max_sqrt_range);
         cell[i] = used ? cell[i] : outside;
@@ -275,7 +275,9 @@ static void follow_rays(const Ground *g, i32 ring, float (*restrict ends)[2], fl
         surface[k] = height[k];
         range_before[k] = range[k];
         sure[k] = found & (is_flat | (is_below == 0)) ? lowest[k] : NAN;
-        may[k] = (uint8_t)((is_flat & (residual < gap * c.hill_slope)) * MAY_JOIN | (stands & is_below & (gap > c.near_m)) * MAY_HIDE);
+        int may_join = is_flat & (residual < gap * c.hill_slope);
+        int may_hide = stands & is_below & (gap > c.near_m);
+        may[k] = (uint8_t)(may_join * MAY_JOIN | may_hide * MAY_HIDE);
         kind[k] = (uint8_t)(found * GROUND | stands * STANDS);
     }
 }
@@ -338,8 +340,8 @@ static void trace(const Ground *g, float height_m, const GroundScratch *s)
         uint8_t *kind = s->kind + row;
         uint8_t *round = (uint8_t *)(s->ends + row); /* the ends of this ring are needed no more */
         float (*behind)[2] = ring + 1 < g->rings ? s->ends + row + sectors : s->ends + row;
-        follow_rays(g, ring, s->ends + row, behind, s->lowest + row, kind, height, range, slope, rise_range_m, sure, s->may,
-                    s->surface + row, s->range_before + row);
+        follow_rays(g, ring, s->ends + row, behind, s->lowest + row, kind, height, range, slope, rise_range_m, sure,
+                    s->may, s->surface + row, s->range_before + row);
         close_round(sure, sizeof *sure, sectors * sizeof *sure, beside);
         join_rays(g, ring, beside, s->may, s->lowest + row, kind, height, range, slope);
         close_round(kind, flank, sectors, round);

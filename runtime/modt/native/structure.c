@@ -2,7 +2,7 @@
 #include "kernels.h"
 
 typedef struct {
-    double cosine, sine, distance_m; /* of the normal; distance of the sensor along it */
+    double cosine, sine, distance_m; /* of the normal; signed distance from the sensor to the line along it */
 } Line;
 
 void place_surface_scratch(i64 n, uintptr_t *end, SurfaceScratch *scratch)
@@ -119,8 +119,8 @@ static void sort_rows(const double *along_m, i32 *order, i64 n)
 }
 
 /* _long_runs of n rows, sorted by position, whose lengths are at the rows too. Marks those kept; returns how many. */
-static i64 long_runs(const StructureRules *rules, const double *along_m, const double *length_m, const i32 *order, i64 n,
-                     uint8_t *on_surface, double *first_m, double *last_m)
+static i64 long_runs(const StructureRules *rules, const double *along_m, const double *length_m, const i32 *order,
+                     i64 n, uint8_t *on_surface, double *first_m, double *last_m)
 {
     i64 kept = 0;
     for (i64 start = 0, end; start < n; start = end) {
@@ -150,6 +150,7 @@ static i64 long_runs(const StructureRules *rules, const double *along_m, const d
     return kept;
 }
 
+/* structure.find_surfaces of n cells; returns how many are on a surface. */
 i64 find_surfaces(const StructureRules *rules, const double *x, const double *y, const double *width_m, i64 n,
                   const SurfaceScratch *scratch, uint8_t *on_surface, double *before_m)
 {
@@ -173,7 +174,8 @@ i64 find_surfaces(const StructureRules *rules, const double *x, const double *y,
             i32 i = scratch->near[k];
             double along_m = y[i] * line.cosine - x[i] * line.sine;
             scratch->along_m[i] = along_m;
-            scratch->length_m[i] = width_m[i] * (1 + __builtin_fabs(along_m) / __builtin_sqrt(x[i] * x[i] + y[i] * y[i]));
+            double range_m = __builtin_sqrt(x[i] * x[i] + y[i] * y[i]);
+            scratch->length_m[i] = width_m[i] * (1 + __builtin_fabs(along_m) / range_m);
         }
         /* 2. Long runs of these along the line are a surface. */
         sort_rows(scratch->along_m, scratch->near, near);

@@ -183,7 +183,7 @@ class PoseEstimator:
         return best
 
     def _corrected(self, placement: Placement, sweep: _Sweep, landmarks: Landmarks) -> Placement:
-        """Placement of a sweep that is observed by another one, corrected once."""
+        """A placement of a sweep, corrected by one registration."""
         correction = self._registration.correct(landmarks, sweep.observe(placement), sweep.correction_share())
         return sweep.place(_rigid(correction @ placement.T_world_sensor))
 

@@ -92,7 +92,7 @@ class LandmarkMap:
         rows = tracks.observed.nonzero()[0]
         off = tracks.kdop.take(rows, axis=0) - self._mean.take(rows, axis=0)
         if self._held.any():
-            far_m = np.hypot(*centres(off.T)[::2])
+            far_m = np.hypot(*centres(off.T)[::2])  # x and y; the other axes are diagonal
             self._held[rows] &= (far_m < self._tuning.max_jump_m) & ~tracks.stationary[rows]
         stays = tracks.stationary[rows] | self._held[rows]
         frames = np.where(stays, self._frames[rows] + 1, 0)
@@ -232,8 +232,8 @@ class Registration:
         """Motion fitted to pairs within reach of a given motion, matched anew in each round."""
         landmarks = view.landmarks
         observations = view.observations
-        near = observations.kdop + np.tensordot(motion, view.jacobian, 1)
-        landmark, observation = self._pairs_within(reach_m, landmarks.kdop, near)
+        placed = observations.kdop + np.tensordot(motion, view.jacobian, 1)
+        landmark, observation = self._pairs_within(reach_m, landmarks.kdop, placed)
         if len(landmark) < _MIN_LANDMARKS:
             return None
         # From here on columns are pairs of a landmark and an observation.
@@ -261,7 +261,7 @@ class Registration:
         return self._kernels.overlapping_pairs(widened, np.concatenate([centre_b, -centre_b]))
 
     def _variance(self, established: Bool, range_m: Float64) -> Float64:
-        """(K,) square of the scale of the errors of pairs: of a landmark, and of an observation at a range [m2]."""
+        """(K,) square of the scale of the errors of the ends of each pair, by landmark and observation [m2]."""
         young_sigma_m = np.where(established, 0.0, self._tuning.young_sigma_m)
         end_sigma_m = self._tuning.end_sigma_m + self._tuning.end_sigma_per_m * range_m
         variance: Float64 = young_sigma_m**2 + end_sigma_m**2

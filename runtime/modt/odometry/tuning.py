@@ -47,7 +47,7 @@ class RegistrationTuning:
     Chosen on: simulated drives, by the errors of the ends of landmarks."""
 
     end_sigma_per_m: float = 0.0007
-    """Growth of that scale per metre of range.
+    """Growth of `end_sigma_m` per metre of range [m/m].
     Chosen on: simulated drives, by the errors of the ends of landmarks."""
 
     young_sigma_m: float = 0.07
@@ -145,6 +145,6 @@ class OdometryTuning:
     Chosen on: judgement; with `repeat_tolerance_m` 1 m/s or 3 degrees/s at 10 Hz."""
 
     repeat_tolerance_m: float = 0.05
-    """Change of a deskewed position at that range beyond which a sweep is registered a second time [m]. Less: more
-    second registrations, at more cost.
+    """Change of a deskewed position at `repeat_range_m` beyond which a sweep is registered a second time [m]. Less:
+    more second registrations, at more cost.
     Chosen on: judgement."""

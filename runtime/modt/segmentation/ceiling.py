@@ -33,7 +33,7 @@ class CeilingFinder:
         self.kernels = kernels
         self.tuning = tuning
         self.highest_m = max_height_m + tuning.grazed_m
-        self.below = Bounds(tuning.clearance_m, np.inf, 0.0, np.inf)
+        self.bounds_below = Bounds(tuning.clearance_m, np.inf, 0.0, np.inf)
 
     def overhead(self, points: Float32, above: Above, sensor_height_m: float) -> Bool | None:
         """(K + L,) points above the ground that belong to a ceiling, None without one.
@@ -46,15 +46,16 @@ class CeilingFinder:
         ceiling_m = self.height_m(above.top, sensor_height_m)
         if ceiling_m is None:
             return None
-        overhead = above.height_m > self.tuning.lowest_m
-        upper = overhead.nonzero()[0]
+        # All that is high enough belongs to it, at first. What is clear below it stays only as a fixture.
+        of_ceiling = above.height_m > self.tuning.lowest_m
+        upper = of_ceiling.nonzero()[0]
         turned = points[above.rows[upper], :4] * np.array([1, 1, -1, 1], np.float32)
-        below = self.kernels.above_ground(self.ground, turned, ceiling_m - sensor_height_m, self.below)
+        below = self.kernels.above_ground(self.ground, turned, ceiling_m - sensor_height_m, self.bounds_below)
         n_below = below.n_tall
-        upper = upper[below.rows[:n_below]]
+        hanging = upper[below.rows[:n_below]]
         is_fixture = below.height_m[:n_below] < self.tuning.fixture_m
-        overhead[upper] = (above.height_m[upper] > self.tuning.head_m) & is_fixture
-        return overhead
+        of_ceiling[hanging] = (above.height_m[hanging] > self.tuning.head_m) & is_fixture
+        return of_ceiling
 
     def height_m(self, top: Float32, sensor_height_m: float) -> float | None:
         """Height of the ceiling above the ground at the sensor [m], None without one.
@@ -67,12 +68,14 @@ class CeilingFinder:
         """
         tuning = self.tuning
         top = np.ascontiguousarray(top.T)  # ray by ray
-        cell = np.flatnonzero(top > max(tuning.lowest_m - sensor_height_m, 0.0))  # a roof is seen from above
+        # A top below the sensor is seen from above, as a roof is.
+        cell = np.flatnonzero(top > max(tuning.lowest_m - sensor_height_m, 0.0))
         if len(cell) < tuning.min_cells:
             return None
-        upper = top.ravel().take(cell) + np.float32(sensor_height_m)
+        height_m = top.ravel().take(cell) + np.float32(sensor_height_m)
         ray = cell // top.shape[1]
-        goes_on = (ray[1:] == ray[:-1]) & (np.abs(np.diff(upper)) < tuning.step_m) & (upper[1:] < self.highest_m)
+        goes_on = (ray[1:] == ray[:-1]) & (np.abs(np.diff(height_m)) < tuning.step_m)
+        goes_on &= height_m[1:] < self.highest_m
         if np.count_nonzero(goes_on) < tuning.min_share * len(cell):
             return None
-        return float(np.median(upper[1:][goes_on]))
+        return float(np.median(height_m[1:][goes_on]))

@@ -81,12 +81,13 @@ class GroundEstimator:
     The lowest return of a cell is ground if it continues the ground of its ray. It may rise by `max_slope_deg` more
     than the running slope of the ray over a short way, on and beside a ramp over a longer one. It may not rise more
     where something stands in the cell, since it may be a flank or a bumper. Far away, and on a ray that has met no
-    ground yet, the next ring counts as well. Nor may it rise on such a ray unless it goes on: where the next
-    `rings_behind` rings have no return, or one that lies lower again, the cell may be the side or the top of
-    something low. Beyond `low_range_m` such a ray does not rise at all. The ground may fall by `max_slope_deg` more
-    over any gap, since only ground lies lower. A ray that has lost the ground finds it again in a cell where nothing
-    stands, if that is as high as ground on a ray beside it. The surface is linear between the ground returns of a
-    ray; beyond its last one, the ground is level, but a ramp goes on for `max_gap_m`.
+    ground yet, what stands in the next ring counts as well. On such a ray the ground may not rise either unless it
+    goes on behind: where the next `rings_behind` rings have no return, or one that lies lower again, the cell may be
+    the side or the top of something low. Beyond `low_range_m` the ground of such a ray does not rise at all. The
+    ground may fall by `max_slope_deg` more over any gap, since only ground lies lower. A ray that has lost the ground
+    finds it again in a cell where nothing stands, if that is as high as ground on a ray beside it. The surface is
+    linear between the ground returns of a ray; beyond its last one, the ground is level, but a ramp goes on for
+    `max_gap_m`.
 
     Behind a crest or an edge, the foot of what stands there is hidden. Where something stands more than `near_m` from
     the last ground, and the lowest return of its cell is below the line of the ray, the ground is taken to be
@@ -276,7 +277,7 @@ class GroundEstimator:
         Beyond the last one it goes on with the (SECTORS,) slope for `max_gap_m`, but rises above no return.
         """
         foot = np.full((1, SECTORS), -sensor_height_m, np.float32)
-        height = np.concatenate([foot, np.where(is_ground, lowest, np.inf)])  # of a cell: one row on
+        height = np.concatenate([foot, np.where(is_ground, lowest, np.inf)])  # of ring k in row k + 1
         ring = np.arange(-1, self.grid.rings)
         range_m = self.range_m(height, np.maximum(ring, 0)[:, None])
         # Nodes are the ground cells of a ray, and its foot, which is row 0. Flat indices rise with the row, so
@@ -287,7 +288,7 @@ class GroundEstimator:
         after = np.minimum.accumulate(np.where(is_node, node, node.size)[::-1], axis=0)[::-1][1:]
         beyond = after == node.size
         after = np.where(beyond, before, after)
-        range_m[0] = 0.0  # of the foot
+        range_m[0] = 0.0  # the foot is below the sensor
         range_before = range_m.take(before)
         height_before = height.take(before)
         since = self.grid.edge_m[:-1, None] - range_before

@@ -59,7 +59,7 @@ class Above(NamedTuple):
 
 
 class Kernels(GeometryKernels):
-    """The passes in NumPy: the reference. A subclass with compiled ones gives the same bytes."""
+    """The passes in NumPy: the reference. A compiled subclass gives the same bytes, but for the last bit of a sum."""
 
     name = "numpy"
     occupied_cells = staticmethod(occupied_cells)

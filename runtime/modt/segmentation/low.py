@@ -43,9 +43,12 @@ class LowFinder:
         self.grid = self.clusterer.fine
 
     def find(self, above: Above, tall: Clusters) -> tuple[Clusters, Int, Int]:
-        """Clusters of P points, given those of the K tall ones; (P,) their places; (2, F) feet.
+        """Clusters of low things and feet, given those of the K tall points.
 
-        Feet are places of points at the foot of something, and of a point each of that.
+        Returns:
+            Clusters of P points.
+            (P,) places of these points.
+            (2, F) places of the points at the foot of something, and for each the place of a tall point of that.
         """
         places, beside = self.kernels.low_points(
             self.clusterer.fine, above.points, above.is_clear, tall, self.max_sqrt_range
@@ -53,8 +56,8 @@ class LowFinder:
         points = above.points.take(places)
         height = above.height_m.take(places)
         cells, sample, sampled, cell_of_point = self.kernels.occupied_cells(self.clusterer.fine, points, height)
-        any_beam_m = np.zeros(len(cells), np.float32)
-        group_of_cell, sizes = self.kernels.cluster(self.clusterer, cells, sampled, any_beam_m)
+        no_beam_m = np.zeros(len(cells), np.float32)  # neighbours are connected whatever the gap (ANY_GAP)
+        group_of_cell, sizes = self.kernels.cluster(self.clusterer, cells, sampled, no_beam_m)
         standing_of_cell = self._standing_of_cell(beside.take(sample), group_of_cell, sizes)
         is_foot = standing_of_cell != NONE
         kind_of_group = self._kind(sizes)

@@ -15,7 +15,7 @@ from modt.types import Bool, Float32, Float64, Int
 PAIRING_DIVISORS = 16, 3
 """Each cell of a sample of n is paired with the one about n / divisor after it: a close one, and a far one."""
 Line = tuple[float, float, float]
-"""Cosine and sine of the normal, and distance of the sensor along it [m]."""
+"""Cosine and sine of the normal, and signed distance from the sensor to the line along it [m]."""
 
 
 def find_surfaces(x: Float64, y: Float64, width_m: Float64, tuning: StructureTuning) -> tuple[Bool, Float64]:

@@ -22,7 +22,7 @@ class PolarGridTuning:
     flat_m: float = 0.1
     """Height range of the returns of a cell above which something stands in it [m]. Chosen on: KITTI scans."""
     flat_slope: float = 0.2
-    """Growth of that height range with the width of the cell [m/m], so that slopes stay flat.
+    """Growth of `flat_m` with the width of the cell [m/m], so that slopes stay flat.
     Chosen on: KITTI scans."""
 
 
@@ -40,7 +40,7 @@ class SensorHeightTuning:
     """Width of a bin of depths below the sensor [m]; a bin and both neighbours must hold the floor.
     Chosen on: KITTI scans."""
     min_cells: int = 12
-    """Flat cells in three neighbouring bins below which there is no floor. Chosen on: KITTI scans."""
+    """Fewest flat cells in three neighbouring bins that are a floor. Chosen on: KITTI scans."""
     horizon_beams: float = 2.0
     """Depth of the least deep cell used [beam spacings]. Higher cells may be shelves or tables.
     Chosen on: simulated rooms."""
@@ -60,7 +60,7 @@ class GroundTuning:
     """Greatest distance over which ground may rise by `max_slope_deg` between two ground cells of a ray [m].
     More takes flanks of cars for ground. Chosen on: KITTI scans."""
     max_gap_m: float = 6.0
-    """`near_m` on and beside a ramp, and the distance over which the slope of a ray is extrapolated [m].
+    """Value of `near_m` on and beside a ramp, and distance over which the slope of a ray is extrapolated [m].
     Chosen on: simulated ramps."""
     ramp_share: float = 0.27
     """Share of `max_slope_deg` above which the running slope of a ray is a ramp. Chosen on: simulated ramps."""
@@ -74,7 +74,8 @@ class GroundTuning:
     flank_sectors: int = 3
     """Sectors to the left and right of a ray whose median bounds its surface. Chosen on: KITTI scans."""
     flank_m: float = 0.25
-    """Height above that median from which a surface is the side of a vehicle [m]. Chosen on: KITTI scans."""
+    """Height above the median across `flank_sectors` from which a surface is the side of a vehicle [m].
+    Chosen on: KITTI scans."""
     rings_behind: int = 8
     """Rings behind a cell in which a rise goes on, or comes down again, on a ray that has met no ground before. Less
     takes low things nearer than all visible ground for ground, more takes hills for things.
@@ -83,19 +84,20 @@ class GroundTuning:
     """Height above the median of the surface beside it from which a surface is the top of a low thing [m].
     More takes people who lie for ground. Chosen on: simulated halls."""
     low_half_width_m: float = 1.2
-    """Distance to the left and right of a ray at which that median is taken [m]. Less takes people who lie for
-    ground. Chosen on: simulated halls."""
+    """Distance to the left and right of a ray at which the median for `low_m` is taken [m]. Less takes people who lie
+    for ground. Chosen on: simulated halls."""
     low_range_m: float = 15.0
-    """Range up to which it is taken, and low returns are looked for [m]. More finds more feet and costs time.
+    """Range up to which low returns and the tops of low things are looked for, and the ground may rise on a ray that
+    has met none before [m]. More finds more feet and costs time.
     Chosen on: simulated halls."""
     clear_m: float = 0.06
     """Height above the roughness of the ground from which a return is clear of it [m]. Less finds things in rough
     ground that are not there. Chosen on: simulated lawns, hills and halls."""
     foot_share: float = 0.6
-    """Share of that height from which returns near something that is clear of the ground belong to it. Less takes
+    """Share of the height of a clear return from which returns near it belong to it, not to the ground. Less takes
     ground for feet. Chosen on: simulated people."""
     min_foot_m: float = 0.03
-    """Least height of such a return [m]. Chosen on: the range noise of common sensors."""
+    """Least height of a foot above the ground [m]. Chosen on: the range noise of common sensors."""
 
 
 @dataclass(frozen=True)
@@ -106,10 +108,10 @@ class CeilingTuning:
     """Least height of a ceiling [m]. Less cuts heads, more misses the ceilings of car parks.
     Chosen on: simulated car parks."""
     min_cells: int = 50
-    """Polar cells with returns above `lowest_m` below which there is no ceiling. Chosen on: judgement."""
+    """Fewest polar cells with returns above `lowest_m` under a ceiling. Chosen on: judgement."""
     min_share: float = 0.4
-    """Share of those cells whose top continues that of the cell before on its ray, from which they are a ceiling.
-    Less cuts shelves, hedges and lorries, more misses the vaults of narrow passages. Chosen on: greatest share
+    """Share of the polar cells with returns above `lowest_m` whose top has to continue that of the cell before on its
+    ray. Less cuts shelves, hedges and lorries, more misses the vaults of narrow passages. Chosen on: greatest share
     without a ceiling, of simulated streets, yards and real scans, .36; least share of a narrow vault, .41."""
     step_m: float = 0.1
     """Difference in height below which a top continues the one before [m]. More takes trees for a ceiling.
@@ -118,7 +120,7 @@ class CeilingTuning:
     """Distance above `max_height_m` up to which a ceiling is looked for [m]: lower returns of it are used.
     Chosen on: simulated halls."""
     clearance_m: float = 0.1
-    """Distance below a ceiling up to which objects reach [m]. Chosen on: simulated car parks."""
+    """Distance below a ceiling within which returns belong to it [m]. Chosen on: simulated car parks."""
     fixture_m: float = 0.5
     """Distance below a ceiling up to which pipes, lamps and beams above `head_m` belong to it [m].
     More cuts vans. Chosen on: simulated car parks."""
@@ -131,10 +133,10 @@ class CellTuning:
     """Connection of neighbouring cells."""
 
     max_gap_m: float = 0.3
-    """Vertical gap below which neighbouring cells are connected [m], added to the next. More joins people with what
-    hangs above them. Chosen on: KITTI scans."""
+    """Vertical gap below which neighbouring cells are connected [m], to which `max_gap_beams` is added. More joins
+    people with what hangs above them. Chosen on: KITTI scans."""
     max_gap_beams: float = 2.0
-    """Growth of that gap [beam spacings at the range of the cell]. Less divides objects that few beams meet.
+    """Growth of `max_gap_m` [beam spacings at the range of the cell]. Less divides objects that few beams meet.
     Chosen on: KITTI scans."""
 
 
@@ -148,7 +150,7 @@ class PorosityTuning:
     reach_m: float = 0.15
     """Least distance below and above a point up to which its window reaches [m]."""
     reach_beams: float = 1.5
-    """The same, in beam spacings at the range of the point."""
+    """Least distance of that kind [beam spacings at the range of the point]; the greater of both counts."""
     point_range_m: float = 7.0
     """Range up to which single points are looked at [m]. More takes people behind dust for dust, less leaves fog
     above heads."""
@@ -159,8 +161,8 @@ class PorosityTuning:
     """Share of the rays of a direction that end in the air, from which the air is full there. Less takes leaves for
     fog, more leaves flakes above heads."""
     min_directions: float = 0.75
-    """Share of the directions in view in which that must be so, for the whole air to be full. Less takes hedges and
-    woods on both sides for fog, more misses fog between walls."""
+    """Share of the directions in view in which the air must be full (`min_air_rays`) for all of it to be. Less
+    takes hedges and woods on both sides for fog, more misses fog between walls."""
     min_cluster_solidity: float = 0.24
     """Mean solidity of its returns from which a cluster can be an object. More takes people in fog for fog."""
     max_range_m: float = 15.0
@@ -195,7 +197,7 @@ class HeadTuning:
     min_extent_m: float = 1.0
     """Extent of a cluster from which heads are looked for [m]. Less divides people in stride."""
     max_extent_m: float = 3.0
-    """Greatest extent of such a cluster [m]. More costs time, and divides hedges."""
+    """Greatest extent of a cluster in which heads are looked for [m]. More costs time, and divides hedges."""
     max_range_m: float = 10.0
     """Range of a cluster up to which heads are looked for [m]. More divides cars, whose roofs few points meet."""
     min_top_m: float = 1.35
@@ -260,7 +262,7 @@ class StructureTuning:
     max_gap_m: float = 1.5
     """Greatest gap within a run of cells along a line [m]: people hide a part of the wall."""
     min_length_m: float = 2.0
-    """Least length of such a run [m]. More keeps people joined to short walls."""
+    """Least length of a run of cells that is a surface [m]. More keeps people joined to short walls."""
     min_filled: float = 0.5
     """Least share of a run that is not gaps. Less takes rows of poles for walls."""
     piece_gap: float = 1.6
@@ -272,7 +274,8 @@ class StructureTuning:
     min_before_m: float = 0.35
     """Least distance that a part reaches before a surface [m]. Less takes bulges of hedges for people."""
     max_behind_m: float = 0.4
-    """Greatest distance that it reaches behind [m]. More takes cars apart, whose seats lie behind their sides."""
+    """Greatest distance that a part which leaves reaches behind the surface [m]. More takes cars apart, whose
+    seats lie behind their sides."""
     min_across_m: float = 0.2
     """Least distance that a part reaches across a surface, from front to back [m]: a person in a doorway."""
     max_bottom_m: float = 0.8
@@ -298,11 +301,12 @@ class ClusterTuning:
     """Points from which a cluster lower than `min_height_m` is kept: one beam meets an object.
     Chosen on: sensor study."""
     min_line_top_m: float = 0.5
-    """Height of the top of such a cluster above the ground [m]; lower ones are kerbs. Chosen on: sensor study."""
+    """Height of the top of a cluster of one beam above the ground [m]; lower ones are kerbs.
+    Chosen on: sensor study."""
     min_part_points: int = 15
     """Points from which a part of an oversized cluster is kept. Chosen on: KITTI scans."""
     min_part_top_m: float = 0.9
-    """Height of the top of such a part above the ground [m]; lower ones are pieces of hedges.
+    """Height of the top of a part of an oversized cluster above the ground [m]; lower ones are pieces of hedges.
     Chosen on: KITTI scans."""
 
 

@@ -127,23 +127,27 @@ class BeamPattern:
 
 
 def find_beams(sweeps: Sequence[Float32], origins_m: Float64 = ORIGINS_M) -> BeamPattern | None:
-    """Beams of sweeps of (N, 4) points; None if there are too few points."""
-    far = [points[np.hypot(points[:, 0], points[:, 1]) > MIN_RANGE_M] for points in sweeps]
-    if sum(map(len, far)) < MIN_POINTS:
+    """Beams of sweeps of (N, 4) points; None if there are too few points.
+
+    Args:
+        sweeps: points of each [m], level or not.
+        origins_m: tried heights of the beams' origin above that of the frame; the first one is the frame's own.
+    """
+    used = [points[np.hypot(points[:, 0], points[:, 1]) > MIN_RANGE_M] for points in sweeps]
+    if sum(map(len, used)) < MIN_POINTS:
         return None
-    rings = _Rings.of_points(np.concatenate(far), origins_m[:1])
+    rings = _Rings.of_points(np.concatenate(used), origins_m[:1])
     if rings.contrast < ONE_ORIGIN_CONTRAST:
-        aside = [points[np.abs(points[:, 1]) > ASIDE * np.abs(points[:, 0])] for points in far]
-        seen = aside if sum(map(len, aside)) > MIN_ASIDE * sum(map(len, far)) else far
-        rings = _Rings.of_points(np.concatenate(seen), origins_m)
-        far = seen
+        aside = [points[np.abs(points[:, 1]) > ASIDE * np.abs(points[:, 0])] for points in used]
+        used = aside if sum(map(len, aside)) > MIN_ASIDE * sum(map(len, used)) else used
+        rings = _Rings.of_points(np.concatenate(used), origins_m)
     if rings.contrast < MIN_CONTRAST or len(rings.peaks) > MAX_BEAMS:
-        return _without_beams(far)
+        return _without_beams(used)
     elevations_deg = np.rad2deg(np.arctan((rings.peaks + 0.5) * BIN - STEEPEST))
     spacing_deg = float(np.median(np.diff(elevations_deg)))
-    step_deg = _azimuth_step_deg(far, rings)
+    step_deg = _azimuth_step_deg(used, rings)
     if step_deg > MAX_ASPECT * spacing_deg:
-        return _without_beams(far)
+        return _without_beams(used)
     return BeamPattern(elevations_deg, spacing_deg, step_deg, rings.contrast)
 
 
@@ -165,6 +169,7 @@ class _Rings:
             bins = ((points[:, 2] - np.float32(origin_m)) * per_m + np.float32(STEEPEST / BIN)).astype(np.int64)
             np.clip(bins, 0, N_BINS - 1, out=bins)
             count = _histogram(bins, weight)
+            # Mean height of the bins around, weighted by what they hold: high where peaks are sharp.
             height = _mean(count * count) / np.maximum(_mean(count), 1e-6)
             score_here = (height * (1.0 if origin_m else FRAME_ORIGIN_FAVOUR)).astype(np.float32)[bins]
             better = score_here > score
@@ -212,12 +217,13 @@ def _joined(peaks: Int, mass: Float64) -> Int:
 
 
 def _contrast(count: Float64, peaks: Int) -> float:
+    """Share of a histogram above the line through the valleys between its peaks."""
     if len(peaks) < 4:
         return 0.0
     valley = np.minimum.reduceat(count, peaks)[:-1]
     inner = slice(int(peaks[0]), int(peaks[-1]))
-    floor = np.interp(np.arange(inner.start, inner.stop), (peaks[1:] + peaks[:-1]) / 2, valley)
-    return float(1 - np.minimum(floor, count[inner]).sum() / count[inner].sum())
+    base = np.interp(np.arange(inner.start, inner.stop), (peaks[1:] + peaks[:-1]) / 2, valley)
+    return float(1 - np.minimum(base, count[inner]).sum() / count[inner].sum())
 
 
 def _azimuth_step_deg(sweeps: Sequence[Float32], rings: _Rings) -> float:
@@ -251,13 +257,13 @@ def _without_beams(sweeps: Sequence[Float32]) -> BeamPattern:
 
 MAX_LIKENESS_RATIO = 1.2
 """Greatest ratio of spacings at which a shipped profile counts as one of the same beams."""
-SAMPLE = 20
+SAMPLE_STEP = 20
 """Step between the points that are compared."""
 
 
 def tangents(points: Float32) -> Float32:
     """(n,) tangents of the elevations of a sample of (N, 4) points; 0 for a point at the sensor itself."""
-    some = points[::SAMPLE]
+    some = points[::SAMPLE_STEP]
     range_m = np.hypot(some[:, 0], some[:, 1])
     return np.asarray(some[:, 2] / np.where(range_m > 0, range_m, np.inf), np.float32)
 

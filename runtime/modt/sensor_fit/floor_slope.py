@@ -17,7 +17,7 @@ TRIED_M = 0.15
 TRIED_SLOPE = 0.02
 """Growth of that distance with range."""
 MAX_TRIED = 200
-"""Number of points by which planes are tried."""
+"""Greatest number of points by which planes are tried."""
 NEAR_M = 0.04
 """Distance from the fitted plane within which a point belongs to the floor at the sensor [m]."""
 NEAR_SLOPES = (0.05, 0.03, 0.015, 0.01)
@@ -41,7 +41,7 @@ class FloorSlope:
     """The floor z = -depth_m - slope . (x, y), and its change with the time from the stamp.
 
     Attributes:
-        slope: (2,) along x and y; these are x and y of the upward normal over its z.
+        slope: (2,) along x and y, positive where the floor falls; these are x and y of the upward normal over its z.
         twist: (2, 2) its rate along x and y at the stamp [1/s], and half the change of the rate [1/s2]. A robot that
             walks turns back within a sweep.
         depth_m: depth below the sensor.
@@ -70,7 +70,7 @@ def floor_slope(xyz: Float64, delay_s: Float64, expected: Float64, depth_m: floa
     y = y[kept]
     delay_s = delay_s[kept]
     range_m = range_m[kept]
-    fall = -z[kept]  # rows of the plane times its depth and slopes on the floor
+    fall = -z[kept]  # on the floor it is plane . rows
     rows = np.stack([np.ones(len(x)), x, y, delay_s * x, delay_s * y, delay_s**2 * x, delay_s**2 * y])
     plane = np.zeros(7)
     plane[0] = depth_m
@@ -88,7 +88,8 @@ def _fitted(rows: Float64, fall: Float64, range_m: Float64, plane: Float64) -> F
         range_m: (n,) range of the points.
         plane: depth, slopes along x and y, their rates, and half the changes of the rates.
     """
-    prior = np.full(7, NOISE_M**2)  # of slopes of 1; it holds what the points leave open
+    # Each value is taken to be 0 with a deviation of 1, MAX_RATE or MAX_BEND, which holds what the points leave open.
+    prior = np.full(7, NOISE_M**2)
     prior[3:5] /= MAX_RATE_PER_S**2
     prior[5:] /= MAX_BEND_PER_S2**2
     normal = np.diag(prior)

@@ -18,7 +18,7 @@ from modt.sensor_fit.tilt import find_floor
 from modt.types import Float32, Float64, Frame
 
 SAMPLE = 1200
-"""Number of points in which the floor is searched."""
+"""Greatest number of points in which the floor is searched."""
 LOOK_EVERY = 40
 """Sweeps from one look at the floor to the next while the robot is steady."""
 LOOK_SWEEPS = 3
@@ -87,7 +87,7 @@ class Leveller:
         return posed is None and self._sweeps % LOOK_EVERY < LOOK_SWEEPS
 
     def _slope_of_pose(self, frame: Frame) -> Float64 | None:
-        """(2,) slope of the plane z = 0 of the world, to the mount; None if poses have no roll and pitch."""
+        """(2,) slope of the plane z = 0 of the world, relative to the mount; None if poses have no roll and pitch."""
         T = frame.T_world_sensor
         if T is None or np.abs(T[2, :2]).max() < FLAT:
             return None
@@ -101,7 +101,7 @@ class Leveller:
         return np.eye(3) if R is None else R
 
     def _floor(self, frame: Frame, posed: Float64 | None) -> FloorSlope | None:
-        """The floor of a sweep, to the mount."""
+        """The floor of a sweep, relative to the mount."""
         if self._depth_m is None:
             found = find_floor(frame.points)
             self._depth_m = found.depth_m if found is not None and found.up @ self._R[2] > 0.5 else None
@@ -135,7 +135,7 @@ class Leveller:
     def _attitude(
         self, floor: FloorSlope | None, posed: Float64 | None, time_s: float
     ) -> tuple[Float64 | None, Float64 | None]:
-        """(2,) slope of the floor to the mount, and its (2, 2) twist; None where the mount alone counts."""
+        """(2,) slope of the floor relative to the mount, and its (2, 2) twist; None where the mount alone counts."""
         if not self._unsteady:
             return (self._mean, None) if np.abs(self._mean).max() > MIN_SLOPE else (None, None)
         twist = None if floor is None else floor.twist
@@ -148,7 +148,7 @@ class Leveller:
         return posed - self._offset, twist
 
     def _up(self, slope: Float64) -> Float64:
-        """(3,) upward normal of the floor in the sensor frame, by its slope to the mount."""
+        """(3,) upward normal of the floor in the sensor frame, by its slope relative to the mount."""
         up = np.array([slope[0], slope[1], 1.0]) @ self._R
         return np.asarray(up / np.sqrt((up * up).sum()))
 

@@ -37,7 +37,7 @@ N_SECTORS = 8
 MIN_TWIST = np.deg2rad(1.0)
 """Least change of the slope of a floor during a sweep that is undone."""
 FLOOR_SAMPLE = 4000
-"""Number of points by which this change is measured."""
+"""Greatest number of points by which this change is measured."""
 MAX_HEIGHT_M = 0.15
 """Greatest difference of the height [m]."""
 MAX_HEIGHT_SHARE = 0.2
@@ -101,8 +101,9 @@ def recognise(points: Float32, config: ProfileConfig) -> Recognition:
     expected = config.sensor
     found = SensorConfig(**beam_keys(pattern))
     tangent = tangents(points)
-    of_sensor = _pattern_differences(expected, found, tangent)
-    floor = find_floor(points, None if of_sensor else expected.height_m)
+    sensor_differences = _pattern_differences(expected, found, tangent)
+    # Another sensor may have another mount, so only that of the same sensor says at what depth its floor is.
+    floor = find_floor(points, None if sensor_differences else expected.height_m)
     tilted = floor and floor.tilt_deg() > MIN_TILT_DEG and _is_open(expected)
     tilt_deg = floor.roll_pitch_deg if floor and tilted else None
     mount = Mount.of(*(tilt_deg or (expected.roll_deg, expected.pitch_deg)))
@@ -110,14 +111,16 @@ def recognise(points: Float32, config: ProfileConfig) -> Recognition:
     found = replace(found, height_m=mount_height_m([mount.turn(points[::2])], found))
     found = replace(found, reflectance=usable_scale(points, scale, found))
     if NONE not in {expected.reflectance, scale} and scale != expected.reflectance:
-        of_sensor.append(f"reflectance of another scale than {expected.reflectance}")
-    of_mount = _mount_differences(expected, found.height_m, mount, floor)
-    if of_sensor:
+        sensor_differences.append(f"reflectance of another scale than {expected.reflectance}")
+    mount_differences = _mount_differences(expected, found.height_m, mount, floor)
+    if sensor_differences:
         fitted = _measured_profile(found, pattern)
     else:
-        fitted = replace(config, sensor=replace(expected, height_m=found.height_m)) if of_mount else config
-    nearest = nearest_profile(found, tangent) if of_sensor else None
-    recognition = Recognition((*of_sensor, *of_mount), nearest, fitted, tilt_deg, not of_sensor)
+        fitted = replace(config, sensor=replace(expected, height_m=found.height_m)) if mount_differences else config
+    nearest = nearest_profile(found, tangent) if sensor_differences else None
+    recognition = Recognition(
+        (*sensor_differences, *mount_differences), nearest, fitted, tilt_deg, not sensor_differences
+    )
     return replace(recognition, fitted=recognition.mounted(fitted))
 
 

@@ -39,7 +39,7 @@ MIN_TILT_DEG = 2.0
 OTHER_SHARE = 0.25
 """A plane whose depth differs from the height of the mount by this share of the height is no floor."""
 HEIGHTS_M = (0.05, 5.0)
-"""Heights that a profile can state."""
+"""Least and greatest height that a profile can state [m]."""
 UPSIDE_DOWN = np.diag([1.0, -1.0, -1.0])
 LEVEL_UP = np.array([0.0, 0.0, 1.0])
 
@@ -49,8 +49,8 @@ class Floor:
     """A floor below the sensor.
 
     Attributes:
-        up: (3,) normal, sensor frame.
-        depth_m: distance of the plane.
+        up: (3,) upward normal, sensor frame.
+        depth_m: distance of the plane below the sensor, along the normal.
         cubes: number of cubes on the plane.
         around: whether the plane goes on both ahead of the sensor and behind it.
     """
@@ -136,16 +136,16 @@ def _fitted(cubes: Float64, R: Float64, depth_m: float) -> Floor | None:
         if n < MIN_CUBES:
             return None
         used = rows[near]  # sums without BLAS, which would start threads
-        normal = (used[:, :, None] * used[:, None]).sum(axis=0)
-        right = (used * z[near, None]).sum(axis=0)
-        plane = np.linalg.solve(normal, right)
-    steep = np.array([-plane[1], -plane[2], 1.0])
-    depth_m = -float(plane[0]) / float(np.linalg.norm(steep))
+        normal_matrix = (used[:, :, None] * used[:, None]).sum(axis=0)
+        right_side = (used * z[near, None]).sum(axis=0)
+        plane = np.linalg.solve(normal_matrix, right_side)
+    normal = np.array([-plane[1], -plane[2], 1.0])
+    depth_m = -float(plane[0]) / float(np.linalg.norm(normal))
     if depth_m < HEIGHTS_M[0]:  # the level beams of a sensor in tall grass are a plane too, through the sensor
         return None
     sides = (side & (np.abs(x) < SIDE_M) for side in (x > 0.0, x < 0.0))
     around = all((side & near).sum() >= MIN_SIDE_SHARE * side.sum() for side in sides)
-    return Floor(R.T @ (steep / np.linalg.norm(steep)), depth_m, n, around)
+    return Floor(R.T @ (normal / np.linalg.norm(normal)), depth_m, n, around)
 
 
 def _turned(R: Float64, columns: Float64) -> Float64:

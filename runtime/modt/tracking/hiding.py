@@ -50,12 +50,12 @@ class Hiding:
             nearest: result of `Sight.look` for the frame; None if its points are not known.
         """
         matches = frame.matches
-        people = IS_WALKER[tracks.object_class[matches.rows]].nonzero()[0]
-        if nearest is None or not len(people):
+        walkers = IS_WALKER[tracks.object_class[matches.rows]].nonzero()[0]
+        if nearest is None or not len(walkers):
             return matches.covariance
-        sides = self._sight.bounded_sides(nearest, frame.proposals, matches.proposals[people])
+        sides = self._sight.bounded_sides(nearest, frame.proposals, matches.proposals[walkers])
         covariance = matches.covariance.copy()
-        covariance[people[sides.any(axis=1)]] += self._tuning.side_sigma_m**2 * np.eye(2)
+        covariance[walkers[sides.any(axis=1)]] += self._tuning.side_sigma_m**2 * np.eye(2)
         return covariance
 
     def keep_hidden(self, tracks: TrackTable, nearest: Float32, T_world_sensor: Float64, dt_s: float) -> None:

@@ -20,10 +20,8 @@ from modt.types import OBSTACLES, Bool, Float32, Float64, Int, Int8, PointKind, 
 
 BEARINGS = 720
 """Bearings of the grid, of equal pseudo-angle."""
-WIDEST_RAD = 8.0 / BEARINGS
-"""Angle of the widest bearing of the grid, of those in which x and y are alike [rad]."""
 SLOPES = 32
-"""Slopes of the grid, from LEAST_SLOPE on."""
+"""Slopes of the grid, which are tangents of elevations, from LEAST_SLOPE on."""
 LEAST_SLOPE = np.float32(-0.6)
 PER_SLOPE = np.float32(25.0)
 """Slopes of the grid in a unit of slope."""

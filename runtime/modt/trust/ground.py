@@ -15,13 +15,13 @@ MIN_CELLS = 12
 ROUNDS = 2
 """Rounds of a fit; each leaves out the cells that are off by more than twice the median."""
 NOTHING_M = 0.04
-"""Median of the heights below which a plane is not fitted to them [m]."""
+"""Median of the absolute values below which no plane is fitted to them, since they are noise [m]."""
 KNOWN_M = 0.15
 """Distance from the plane within which a third of the lowest returns have to lie to be of a ground [m]."""
 KNOWN_LOOKS = 5
 """Number of looks in a row in which they do. Rain and snow are no ground for long."""
 LEAST_SHARE = 0.5
-"""Share of the height by the profile that the sensor is at least above a plane that is the ground."""
+"""Least height of the sensor above a plane that is the ground, as a share of its height by the profile."""
 MIN_STEP_M = 0.08
 """Least limit of a change of the height [m], under a sensor that is low."""
 BACK_SHARE = 0.7
@@ -31,9 +31,10 @@ KNOWN_SHARE = 0.35
 UNSEEN_FACTOR = 2.5
 """Multiple of the limits by which the ground has moved if the sensor went on while nothing was seen."""
 WITHDRAWN_S = 60.0
-"""Time for which a step is known that was taken for back, as the ground looked like the one before it [s]."""
+"""Time for which a step that was withdrawn is remembered [s]. It is withdrawn too early where the ground elsewhere
+looks like the one before it."""
 LEFT_SHARE = 0.35
-"""Share of a step that another one may leave, as the ground has another shape elsewhere."""
+"""Share of a step that may be left after the way back, as the ground has another shape elsewhere."""
 OUT_OF_VIEW = np.array([np.inf, 0.0, 0.0])
 """Step of a ground that is no longer seen where it was."""
 
@@ -57,9 +58,9 @@ class GroundCheck:
         self._profile_z_m = self.plane[0]
         self.phrase = ""
         self.undone = False
-        self._offset = np.zeros(3)  # plane by which it is moved
-        self._greatest = 0.0  # greatest size that it had
-        self._before: Sample | None = None  # the last sweep before that
+        self._offset = np.zeros(3)  # plane by which the ground is off `plane` now
+        self._greatest = 0.0  # greatest size that the offset had
+        self._before: Sample | None = None  # the last sweep before the ground moved; None if it has not, or is back
         self._looks = 0  # in a row in which it is back
         self._withdrawn: tuple[float, Float64] | None = None  # time and offset of one that was taken for back
         self._known_looks = 0  # in a row in which enough of the lowest returns lie on the plane
@@ -103,7 +104,7 @@ class GroundCheck:
         self._add_steps(threes)
         if self._before is None:
             return
-        # By the sweep before the step, as long as the place is the same, or by the known plane, with a closer bound.
+        # By the sweep before the step, as long as the place is the same. Elsewhere by the known plane, within less.
         as_before = self._size(_moved_between(self._before, now)) < BACK_SHARE
         is_back = as_before or self._size(self._from_plane(now)) < KNOWN_SHARE
         self._looks = self._looks + 1 if is_back else 0
@@ -220,8 +221,8 @@ def _moved_between(before: Sample, after: Sample) -> Float64:
 def _moved_at_once(before: Sample, between: Sample, after: Sample) -> Float64:
     """Plane (3,) by which most of the cells moved from one of three sweeps to the next.
 
-    What happens to a sensor does not wait for its seam. Some directions of the sweep in which it begins show it
-    already, so each cell is taken where it moved farther. Of a slope that is driven over, about half counts.
+    What happens to a sensor begins somewhere within a sweep. Some directions of that sweep show it already,
+    so each cell is taken where it moved farther. Of a slope that is driven over, about half counts.
     """
     cells = np.flatnonzero(np.isfinite(before.lowest_m) & np.isfinite(between.lowest_m) & np.isfinite(after.lowest_m))
     if len(cells) < MIN_CELLS:

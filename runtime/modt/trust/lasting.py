@@ -25,8 +25,8 @@ class BeamHistory:
     """Returns of each beam over a window of time.
 
     A beam is dead if it has none where the beams above and below it have many. The outermost beams have a neighbour
-    on one side only, so nothing tells that they should have met anything. Beams of a table must have had returns
-    before, as a table that was found in a sweep may have one too many.
+    on one side only, so nothing tells that they should have met anything. Where the profile lists the elevations,
+    a beam must have had returns before: a list that was measured in a sweep may have one too many.
 
     Args:
         sensor: elevations of its beams.
@@ -65,7 +65,7 @@ class BeamHistory:
             self._n_seen = 0
 
     def _judge(self) -> None:
-        """Find the dead beams by the returns of the window."""
+        """Set the dead beams by the returns of the window."""
         if self._n_on_beam < self._tuning.on_beam_share * self._n_seen:
             self.dead_deg = ()  # no beams, or others than those of the profile
             return

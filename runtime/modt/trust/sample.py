@@ -22,7 +22,7 @@ NEAREST_M = 0.7
 """Greatest distance of what covers the sensor and is no return [m]."""
 SECTORS = 24
 """Parts of a turn, counted from behind and counter-clockwise."""
-HEIGHTS = 8.0
+GROUND_HEIGHTS = 8.0
 GROUND_M = (6.0, 15.0)
 """Range within which the ground is near [heights of the sensor], and its limits [m]."""
 RINGS = 15
@@ -126,7 +126,7 @@ class Sample:
 
         It is infinite in a cell without returns, and where the ground is below all beams of a tilted sensor.
         """
-        reach_m = np.clip(HEIGHTS * abs(self.plane[0]), *GROUND_M)
+        reach_m = np.clip(GROUND_HEIGHTS * abs(self.plane[0]), *GROUND_M)
         near = np.flatnonzero(self.range_m < reach_m)
         cell = self.sector.take(near) * RINGS + self.range_m.take(near).astype(np.int64)
         lowest_m = np.full(SECTORS * RINGS, np.inf, np.float32)

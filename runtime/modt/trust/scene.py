@@ -20,8 +20,9 @@ BEARINGS = 72
 LOG_STEP = 0.08
 """Width of a cell in the logarithm of the range."""
 OF_SECTOR = BEARINGS // SECTORS
+"""Bearings of the grid in a sector of a sample."""
 FIRST_RANGE_M = 1.0
-"""Range of the first cell [m]."""
+"""Range at which the grid begins [m]. Nearer points are in its first cells."""
 RANGES = 50
 """Cells along the range, up to 54 m."""
 MIN_POINTS = 40
@@ -124,10 +125,13 @@ class SceneCheck:
     ) -> None:
         """Notice a scene that changes at once, and one that is back.
 
-        `pairs` are those of sweeps since `first` with one sweep between them; the others as in the ground's check.
-
-        On a ground that has moved, obstacles are less sure, so a change has to explain nearly all of them. A scale is
-        told by the ground alone.
+        Args:
+            first: the sweep of the last look, or the last one before nothing was seen.
+            now: the sweep that is looked at.
+            pairs: sweeps since then between which it may have changed; mostly those with one sweep between them.
+            back_looks: number of looks in a row in which it has to be back.
+            on_moved_ground: whether the ground has moved. Obstacles are less sure then, so a change has to explain
+                nearly all of them, and a scale is left to the ground's check.
         """
         tuning = self._tuning
         agreed = self._agreement(first, now)
@@ -144,7 +148,7 @@ class SceneCheck:
             self.before = None
 
     def may_have_changed(self, first: Sample, now: Sample) -> bool:
-        """Whether fewer obstacle points stood still than at the last look."""
+        """Whether few obstacle points stood still, or clearly fewer than at the last look."""
         agreed = self._agreement(first, now)
         return agreed < self._tuning.same or self._falls_to(agreed)
 
@@ -216,7 +220,7 @@ def _as_placed(before: Sample, after: Sample) -> Iterator[Sample]:
 
 
 def _cells(x: Float32, y: Float32, turn: Float32) -> Int:
-    """(k,) cells of points, below 0 where they are beyond the grid."""
+    """(k,) cells of points at x and y [m] and their bearings [turns], below 0 beyond the grid."""
     bearing = part_of_turn(turn, BEARINGS)
     far = (np.log(np.maximum(x * x + y * y, FIRST_RANGE_M**2)) * np.float32(0.5 / LOG_STEP)).astype(np.int64)
     return np.where(far < RANGES, bearing * RANGES + far, -1)

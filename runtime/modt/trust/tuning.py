@@ -161,7 +161,7 @@ class SceneTuning:
     Chosen on: simulated drives."""
 
     same: float = 0.6
-    """Share of the obstacle points at known places below which two frames in a row show different scenes.
+    """Share of the obstacle points at known places below which two sweeps show different scenes.
     Chosen on: simulated drives, in which the least is 0.82."""
 
     back: float = 0.75
