@@ -184,7 +184,8 @@ class RequestTuning:
     Chosen on: simulated people who sit, crouch and lie.
     """
     unseen_hits: int = 2
-    """Frames with a proposal before such a view [frames]. More of them spare calls on spurious proposals.
+    """Frames with a proposal before a track is classified by `unseen_m` [frames]. More of them spare calls on
+    spurious proposals.
 
     Chosen on: simulated people who sit, crouch and lie.
     """

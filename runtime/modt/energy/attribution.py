@@ -1,6 +1,6 @@
 """Attribution of energy to idling and the stages. Reports, pages and the status all split energy by this rule.
 
-A board is described by the keys of its profile: E_window = idle_W T + seg_J N_seg + class_J N_class + point_J N_points.
+A board is described by keys of its profile: E_window = idle_W T + seg_J N_seg + class_J N_class + point_J N_points.
 """
 
 from __future__ import annotations

@@ -447,7 +447,8 @@ static i64 keep_points(const Ground *g, const GroundScratch *s, const u4 *points
     float *const *kept = out->kept;
     int8_t *kind = out->kind + start;
     float below[N_LEVELS][BLOCK], height[BLOCK], low = g->min_height_m, high = g->max_height_m;
-    uint8_t is_kept[BLOCK + GROUP] = {0}, is_low[BLOCK + GROUP] = {0}, is_clear[BLOCK];
+    uint8_t is_kept[BLOCK + GROUP] = {0}, is_low[BLOCK + GROUP] = {0}; /* the last group may reach beyond n */
+    uint8_t is_clear[BLOCK];
     /* 1. The surface of the cell of each point, by columns. */
     for (i64 i = 0; i < BLOCK; i += 4) {
         u4 of_point[4], column[4];

@@ -120,7 +120,8 @@ class HeadingTuning:
     Chosen on: 24 simulated drives of six sensors (seeds 1402 and 1403), and the labels of KITTI's objects.
     """
     beside_m: float = 3.0
-    """Distance across it up to which that is so [m]. With more, cars in the next row are turned as this one.
+    """Distance across the axis of a car up to which another one has the same axis [m]. With more, cars in the next
+    row are turned as this one.
 
     Chosen on: the labels of KITTI's objects, and a posed car park whose rows stand across each other.
     """

@@ -148,14 +148,17 @@ class Clusterer:
         return np.maximum(label_max(of_cell, clusters.cluster_of_cell, clusters.n), np.float32(0.0))
 
     def _kind(self, sizes: ClusterSizes, unseen_m: Float32 | float = 0.0) -> Int8:
-        """(G,) PointKind: MEMBER of an object's size. A part of an oversized cluster must stand out from it."""
+        """(G,) PointKind: MEMBER of an object's size. A part of an oversized cluster must stand out from it.
+
+        Oversized clusters were divided; what is left may be an object up to `max_extent_m`.
+        """
         config = self.config
-        oversized = sizes.extent_m >= config.max_extent_m
+        endless = sizes.extent_m >= config.max_extent_m
         stands_out = (sizes.top_m >= self.valid.min_part_top_m) & (sizes.points >= self.valid.min_part_points)
         tall = sizes.top_m - sizes.bottom_m + unseen_m >= config.min_height_m
         line = (sizes.points >= self.valid.min_line_points) & (sizes.top_m > self.valid.min_line_top_m)
         kind = np.full(len(sizes), PointKind.MEMBER, np.int8)
         kind[~(tall | line)] = PointKind.LOW
         kind[sizes.points < config.min_points] = PointKind.SPARSE
-        kind[oversized | (sizes.of_oversized & ~stands_out)] = PointKind.STRUCTURE
+        kind[endless | (sizes.of_oversized & ~stands_out)] = PointKind.STRUCTURE
         return kind

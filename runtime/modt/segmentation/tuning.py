@@ -94,8 +94,8 @@ class GroundTuning:
     """Height above the roughness of the ground from which a return is clear of it [m]. Less finds things in rough
     ground that are not there. Chosen on: simulated lawns, hills and halls."""
     foot_share: float = 0.6
-    """Share of the height of a clear return from which returns near it belong to it, not to the ground. Less takes
-    ground for feet. Chosen on: simulated people."""
+    """Share of the height from which a return is clear of the ground; returns from this share on may be its foot.
+    Less takes ground for feet. Chosen on: simulated people."""
     min_foot_m: float = 0.03
     """Least height of a foot above the ground [m]. Chosen on: the range noise of common sensors."""
 
@@ -150,7 +150,7 @@ class PorosityTuning:
     reach_m: float = 0.15
     """Least distance below and above a point up to which its window reaches [m]."""
     reach_beams: float = 1.5
-    """Least distance of that kind [beam spacings at the range of the point]; the greater of both counts."""
+    """`reach_m` in beam spacings at the range of the point; the greater of both counts."""
     point_range_m: float = 7.0
     """Range up to which single points are looked at [m]. More takes people behind dust for dust, less leaves fog
     above heads."""
@@ -301,7 +301,7 @@ class ClusterTuning:
     """Points from which a cluster lower than `min_height_m` is kept: one beam meets an object.
     Chosen on: sensor study."""
     min_line_top_m: float = 0.5
-    """Height of the top of a cluster of one beam above the ground [m]; lower ones are kerbs.
+    """Height of the top of a cluster that one beam meets above the ground [m]; lower ones are kerbs.
     Chosen on: sensor study."""
     min_part_points: int = 15
     """Points from which a part of an oversized cluster is kept. Chosen on: KITTI scans."""

@@ -157,9 +157,9 @@ def locate_pieces(
     both = touched & touched[OPPOSITE]
     off = kdop - mean
     off = np.where(both, 0.0, np.where(touched, -off[OPPOSITE], off))
-    before = tracks.end_variance.T.take(rows, axis=1) + both[:4] * UNMEASURED_M2
+    end_variance_before = tracks.end_variance.T.take(rows, axis=1) + both[:4] * UNMEASURED_M2
     shift, covariance, end_variance = now.kernels.measured(
-        mean, mean + off, np.zeros((2, len(rows))), variance, before
+        mean, mean + off, np.zeros((2, len(rows))), variance, end_variance_before
     )
     match_of_piece = (matches.rows == rows[:, None]).argmax(axis=1)
     # The pieces are new to their tracks, so the matches hold the expected positions, from which the shift leads.

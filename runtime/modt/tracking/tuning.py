@@ -112,16 +112,17 @@ class MotionEvidenceTuning:
     Chosen on: simulated streets, by parts of walls that were reported as moving."""
 
     compact_one_side_weight: float = 0.5
-    """The same of a compact proposal, which is rarely a part of a surface. Less: people who walk among other things
-    are seen later.
+    """Weight of evidence from a compact proposal that is bounded on one side, since it is rarely a part of a surface.
+    Less: people who walk among other things are seen later.
     Chosen on: simulated streets and aisles, by static things that were reported as moving."""
 
     compact_two_sides_weight: float = 0.15
-    """The same of a compact proposal that is bounded on both sides.
+    """Weight of evidence from a compact proposal that is bounded on both sides.
     Chosen on: simulated streets and aisles, by static things that were reported as moving."""
 
     object_weight: float = 0.5
-    """The same of a track whose class is neither background nor that of a walker, bounded on one side or both.
+    """Weight of evidence from the proposal of a track whose class is neither background nor that of a walker, bounded
+    on one side or both.
     Chosen on: simulated streets, by the error of velocities."""
 
     max_compact_m: float = 1.2
@@ -265,8 +266,8 @@ class ExtentTuning:
     Chosen on: judgement."""
 
     person_growth: float = 0.1
-    """The same for a confirmed person, who is merged with things in passing. Greater: cyclists beside walls lose
-    their class.
+    """`growth` of a confirmed person, who is merged with things in passing. Greater: cyclists beside walls lose their
+    class.
     Chosen on: pandar64 drives with cyclists beside walls."""
 
     shrinkage: float = 0.02
@@ -368,7 +369,8 @@ class RegroupingTuning:
     Chosen on: people at the doors of simulated cars, with a check on simulated streets."""
 
     min_person_points: int = 20
-    """Points from which such a possible person is no part of the car. Less: cars of which little is seen fall apart.
+    """Points from which a possible person beside a car is no part of it. Less: cars of which little is seen fall
+    apart.
     Chosen on: simulated streets."""
 
     min_probability: float = 0.5

@@ -72,8 +72,8 @@ class GroundCheck:
             off_m = sample.lowest_m.take(cells) - self.plane @ CELLS.take(cells, axis=1)
             self.plane = self.plane + self._tuning.gain * _fitted(cells, off_m)
             on_it = float(np.sort(np.abs(off_m))[len(cells) // 3]) < KNOWN_M
-            below = self.plane[0] < LEAST_SHARE * self._profile_z_m
-            self._known_looks = self._known_looks + 1 if on_it and below else 0
+            deep_enough = self.plane[0] < LEAST_SHARE * self._profile_z_m
+            self._known_looks = self._known_looks + 1 if on_it and deep_enough else 0
 
     @property
     def present(self) -> Float64:

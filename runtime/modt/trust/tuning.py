@@ -178,7 +178,7 @@ class SceneTuning:
     Chosen on: simulated drives."""
 
     surely_explained: float = 0.95
-    """The same share where the scene could be the one before, as between two like walls.
+    """`explained` where the scene could be the one before, as between two like walls, or the ground has moved.
     Chosen on: simulated aisles."""
 
 
