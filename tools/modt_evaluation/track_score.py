@@ -22,7 +22,7 @@ MIN_FRAMES_FOLLOWED = 3
 
 @dataclass(frozen=True)
 class Length:
-    """Mean number of frames for which a track follows an object (N_go), beside that of faultless tracking."""
+    """Mean number of frames for which a track follows a labelled object, beside that of faultless tracking."""
 
     objects: int  # objects counted
     frames: int  # frames counted, summed over the objects

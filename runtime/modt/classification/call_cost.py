@@ -69,7 +69,7 @@ class LinearCost:
 
     @property
     def outdated(self) -> bool:
-        """True after so many frames without a call that a measurement is worth exceeding the budget."""
+        """True after so many starved frames since the last call that a measurement is worth exceeding the budget."""
         return self._starved >= self._tuning.starved_frames
 
     def cost_ms(self, points: Int) -> float:

@@ -184,13 +184,11 @@ static float median_of(float *numbers, i32 n)
     return n ? numbers[(n - 1) / 2] : INFINITY;
 }
 
-/* GroundEstimator.clear_m of the near rings, and the highest return of each cell. `rays` is scratch. */
-static void measure_roughness(const Ground *g, const GroundScratch *s, float *top)
+/* GroundEstimator.clear_m of the near rings, by the highest return of each cell. `rays` is scratch. */
+static void measure_roughness(const Ground *g, const GroundScratch *s, const float *top)
 {
-    i32 in_quarter = g->sectors / g->quarters, cells = g->rings * g->sectors;
+    i32 in_quarter = g->sectors / g->quarters;
     float *ranges = s->rays;
-    for (i32 k = 0; k < cells; k++)
-        top[k] = -s->ends[k][1];
     for (i32 first = 0; first < g->near_rings * g->sectors; first += in_quarter) {
         i32 n = 0;
         for (i32 k = first; k < first + in_quarter; k++) {
@@ -534,6 +532,8 @@ EXPORT void modt_above_ground(const Ground *g, const u4 *points, i64 n, float he
         place_points(g, points + i, m, s->z + i, s->sqrt_range + i, s->cell + i);
         find_ends(g, height_m, m, s->z + i, s->sqrt_range + i, s->cell + i, s->ends);
     }
+    for (i64 k = 0; k < cells; k++)
+        out->top[k] = -s->ends[k][1]; /* before the next passes raise it */
     measure_roughness(g, s, out->top);
     reach_across(g, s, n);
     /* GroundEstimator._tops, in place; ascending, so that each cell reads a ring that is not yet raised. */

@@ -204,7 +204,7 @@ class CellClusterer:
         cells: gap between neighbouring cells of one cluster.
         split: parts that are a person.
         structure: surfaces, and parts before them.
-        valid: points and height of a part that stands out.
+        kept: points and height of a part that stands out.
     """
 
     def __init__(
@@ -214,12 +214,12 @@ class CellClusterer:
         cells: CellTuning = CellTuning(),
         split: SplitTuning = SplitTuning(),
         structure: StructureTuning = StructureTuning(),
-        valid: ClusterTuning = ClusterTuning(),
+        kept: ClusterTuning = ClusterTuning(),
     ) -> None:
         self.gap = cells
         self.split = split
         self.structure = structure
-        self.valid = valid
+        self.kept = kept
         self.max_extent_m = config.max_extent_m
         step = config.cell_m / np.sqrt(10.0)
         # Points are placed on the fine grid alone, and a coarse cell is two by two fine ones. So the centre of the
@@ -323,8 +323,8 @@ class CellClusterer:
         behind = (front_m < 0) & (back_m > -np.float32(tuning.max_hidden_m))
         behind &= parts.top_m > surface_top_m + np.float32(tuning.min_above_m)
         hidden_person = self._may_be_person(parts, self.split.hidden_person) & behind
-        stands_out = parts.points >= self.valid.min_part_points
-        stands_out &= parts.top_m >= np.float32(self.valid.min_part_top_m)
+        stands_out = parts.points >= self.kept.min_part_points
+        stands_out &= parts.top_m >= np.float32(self.kept.min_part_top_m)
         stands_out &= parts.extent_m >= np.float32(tuning.min_part_extent_m)
         oversized = extent_m >= np.float32(tuning.oversized_m)
         endless = extent_m >= np.float32(self.max_extent_m)

@@ -48,8 +48,8 @@ class Clusterer:
         self.gaps = NO_GAPS  # of dead beams
         self.cells = CellClusterer(sensor, config, tuning.cells, tuning.split, tuning.structure, tuning.clusters)
         self.porosity = PorosityFinder(sensor, self.cells.fine, tuning.porosity)
-        self.tuning = tuning.porosity
-        self.valid = tuning.clusters
+        self.min_solidity = tuning.porosity.min_cluster_solidity
+        self.kept = tuning.clusters
         self.heads = tuning.heads
         max_diagonal_m = min(tuning.strips.max_diagonal_m, config.max_extent_m)
         self.strips = replace(tuning.strips, max_diagonal_m=max_diagonal_m)
@@ -73,19 +73,19 @@ class Clusterer:
         found = replace(found, cluster_of_cell=cluster, n=len(sizes))
         # Strips are merged before clusters are judged, since a strip alone may be too low to be an object.
         unseen_m = self._unseen_m(found)
-        is_member = self._kind(sizes, unseen_m) == PointKind.MEMBER
-        strip = (is_member | ~sizes.of_oversized) & self.may_be_strips(sizes)
+        is_object = self._kind(sizes, unseen_m) == PointKind.MEMBER
+        strip = (is_object | ~sizes.of_oversized) & self.may_be_strips(sizes)
         target = self._merged(found, strip)
         kind = self._kind(sizes.merged(target), unseen_m)
         target_of_cell = target.take(cluster)
-        is_porous = self.kernels.mean_solidity(found, target_of_cell, len(kind)) < self.tuning.min_cluster_solidity
+        is_porous = self.kernels.mean_solidity(found, target_of_cell, len(kind)) < self.min_solidity
         kind[is_porous] = kind_of_porous
-        valid = kind == PointKind.MEMBER
+        is_member = kind == PointKind.MEMBER
         return replace(
             found,
-            cluster_of_cell=consecutive(valid).take(target_of_cell),
+            cluster_of_cell=consecutive(is_member).take(target_of_cell),
             kind_of_cell=kind.take(target_of_cell),
-            n=int(np.count_nonzero(valid)),
+            n=int(np.count_nonzero(is_member)),
         )
 
     def _people_split_off(
@@ -154,9 +154,9 @@ class Clusterer:
         """
         config = self.config
         endless = sizes.extent_m >= config.max_extent_m
-        stands_out = (sizes.top_m >= self.valid.min_part_top_m) & (sizes.points >= self.valid.min_part_points)
+        stands_out = (sizes.top_m >= self.kept.min_part_top_m) & (sizes.points >= self.kept.min_part_points)
         tall = sizes.top_m - sizes.bottom_m + unseen_m >= config.min_height_m
-        line = (sizes.points >= self.valid.min_line_points) & (sizes.top_m > self.valid.min_line_top_m)
+        line = (sizes.points >= self.kept.min_line_points) & (sizes.top_m > self.kept.min_line_top_m)
         kind = np.full(len(sizes), PointKind.MEMBER, np.int8)
         kind[~(tall | line)] = PointKind.LOW
         kind[sizes.points < config.min_points] = PointKind.SPARSE

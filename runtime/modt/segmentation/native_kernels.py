@@ -88,7 +88,7 @@ def _cluster_rules(clusterer: CellClusterer) -> Filled:
 
 
 def _structure_rules(clusterer: CellClusterer) -> Filled:
-    return _filled(STRUCTURE_RULES, clusterer.structure, clusterer.valid)
+    return _filled(STRUCTURE_RULES, clusterer.structure, clusterer.kept)
 
 
 class NativeKernels(NativeGeometryKernels, Kernels):

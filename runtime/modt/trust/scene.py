@@ -134,10 +134,9 @@ class SceneCheck:
                 nearly all of them, and a scale is left to the ground's check.
         """
         tuning = self._tuning
-        agreed = self._agreement(first, now)
-        fell = self._falls_to(agreed)
-        self._agreed = agreed
-        if fell or agreed < tuning.same or not self.change.is_none:
+        suspected = self.may_have_changed(first, now)
+        self._agreed = self._agreement(first, now)
+        if suspected or not self.change.is_none:
             self._notice(pairs, on_moved_ground=on_moved_ground)
         if self.before is None:
             return
