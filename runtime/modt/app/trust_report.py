@@ -30,8 +30,8 @@ class TrustReport:
         watch: the checks; by default those of this sensor.
 
     Attributes:
-        watch: the checks; another sensor needs another one.
-        visibility: the estimate of the visibility; so does this.
+        watch: the checks of this sensor.
+        visibility: the estimate of the visibility, by this sensor.
         trust: that of the last frame.
         frames: number of frames by level.
     """

@@ -328,8 +328,8 @@ class CallCostTuning:
     Chosen on: judgement.
     """
     starved_frames: int = 100
-    """Starved frames since the last call after which one call may exceed the budget, which corrects an estimate that is
-    too high [frames].
+    """Starved frames since the last call after which one call may exceed the budget, which corrects an estimate that
+    is too high [frames].
 
     Chosen on: judgement.
     """

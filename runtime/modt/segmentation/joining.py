@@ -1,8 +1,8 @@
 """Joining: merge the proposals of several sensors, so that an object seen by several gets one proposal.
 
 Each sensor is segmented by itself, since the ground, the clusters and what rays pass follow from the order of its
-beams. Each proposal then joins the proposal of another sensor with which it shares most cells. What one sensor keeps
-apart, such as a person and the car beside them, stays apart unless another sensor sees it as one.
+beams. Each proposal then joins the proposal of another sensor with which it shares more cells than with any other.
+What one sensor keeps apart, such as a person and the car beside them, stays apart unless another sees it as one.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ def _partners(proposals: Proposals, sensor: Int, tuning: JoiningTuning) -> Int:
     """(2, k) pairs of proposals that are joined.
 
     Two proposals of two sensors are joined where they share cells, are near one another in height, and at least one
-    of them shares most of its cells with the other.
+    of them shares more cells with the other than with any third.
     """
     n = len(proposals)
     cells = [_cells(proposals, np.flatnonzero(sensor == k), tuning.cell_m) for k in range(sensor.max(initial=-1) + 1)]

@@ -121,9 +121,9 @@ def pairs(bounds: ViewBounds, beam_rad: Float32, tuning: StripTuning) -> tuple[I
 
 def fits(bounds: ViewBounds, tuning: StripTuning) -> Bool:
     """(G,) no larger than a car."""
-    fits: Bool = bounds.diagonal_m2 < np.square(np.float32(tuning.max_diagonal_m))
-    fits &= (bounds.width_m < tuning.max_width_m) & (bounds.max[HEIGHT] < tuning.max_top_m)
-    return fits
+    fitting: Bool = bounds.diagonal_m2 < np.square(np.float32(tuning.max_diagonal_m))
+    fitting &= (bounds.width_m < tuning.max_width_m) & (bounds.max[HEIGHT] < tuning.max_top_m)
+    return fitting
 
 
 def _propagate_min(label: Int, one: Int, other: Int) -> None:

@@ -11,7 +11,7 @@ from modt.types import Cut, Float32, Float64, Int
 
 
 class ViewEnds:
-    """Tells which sides of proposals are cut, above as far away as the highest beam is below `max_height_m`.
+    """Tells which sides of proposals are cut. Above, that ends where the highest beam has risen to `max_height_m`.
 
     Args:
         sensor: mount, beams, nearest range and blind sectors.
@@ -26,7 +26,7 @@ class ViewEnds:
         self._at_lowest = Cut.BOTTOM if upright_share > 0 else Cut.TOP
         self._at_highest = Cut.TOP if upright_share > 0 else Cut.BOTTOM
         self._near_m = sensor.min_range_m + tuning.near_m
-        # (E, 2) directions of the edges of the blind sectors, and tangent of the angle to one of a return at it.
+        # (E, 2) directions of the edges of blind sectors, and tangent of the widest angle from one to a return at it.
         edges_rad = np.deg2rad(sensor.blind_sectors_deg or ())
         self._edges = np.stack([np.cos(edges_rad), np.sin(edges_rad)], axis=1).astype(np.float32)
         self._edge_tangent = np.tan(np.deg2rad(2 * sensor.azimuth_step_deg))
@@ -39,8 +39,8 @@ class ViewEnds:
             outward = np.array([-1.0, 1.0])  # the lowest beam, and the highest
             span_rad = np.deg2rad(sensor.span_deg)
             tangents = np.tan(span_rad)
-            mount_m = sensor.height_m or 0.0
-            hidden_m = np.array([mount_m, max_height_m - mount_m])
+            sensor_m = sensor.height_m or 0.0
+            hidden_m = np.array([sensor_m, max_height_m - sensor_m])
             tilt_rad = np.arccos(abs(upright_share))
             level_reach_m, tilted_reach_m = (
                 hidden_m / np.maximum(np.tan(outward * span_rad - by_rad), 1e-3) for by_rad in (0.0, tilt_rad)

@@ -15,7 +15,7 @@ from modt.types import Float32
 FEW_SHARE = 0.15
 """Share of the returns that beams and steps of a profile make below which a sweep has too few."""
 EMPTY_SECTORS = 4
-"""Number of sectors in a row without returns from which a part of the view is missing."""
+"""Number of sectors without returns from which a part of the view is missing."""
 ONE_RING = 0.03
 """Width of the tangents of the elevations within which nine tenths of a sweep are one ring."""
 NEAR_M = 8.0

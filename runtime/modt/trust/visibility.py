@@ -48,8 +48,8 @@ class VisibilityEstimate:
         self._last_s = time_s
         self._share += gain * (share - self._share)
         extinction_per_m = -math.log(1.0 - min(self._share, 0.99)) / self._tuning.depth_m
-        visible = extinction_per_m * self._tuning.most_m < CONTRAST
-        self.visibility_m = None if visible else CONTRAST / extinction_per_m
+        is_good = extinction_per_m * self._tuning.most_m < CONTRAST
+        self.visibility_m = None if is_good else CONTRAST / extinction_per_m
 
     def findings(self) -> dict[str, Finding]:
         """Findings about the sweeps, by the name of the check."""
