@@ -25,13 +25,15 @@ def sweeps():
     return [frame.points for frame in SyntheticStream("yard", "vlp-16", 1.0, seed=12)]
 
 
-def looks(fault=None, from_s=0.0, seconds=30.0, sensor=SENSOR):
-    """Sample of each look at the sweeps, with a fault from a time on."""
+def looks(fault=None, from_s=0.0, seconds=30.0, sensor=SENSOR, slow_fault=None):
+    """Sample of each look at the sweeps, with a fault from a time on, or one that knows the time since then."""
     for k in range(int(seconds / LOOK_S)):
         time_s = k * LOOK_S
         points = sweeps()[k % len(sweeps())]
         if fault and time_s >= from_s:
             points = fault(points)
+        if slow_fault and time_s >= from_s:
+            points = slow_fault(points, time_s - from_s)
         yield sample(Frame(k, time_s, points), np.eye(4), sensor, np.zeros(3))
 
 
@@ -45,6 +47,22 @@ def without_beam(at_deg):
 
 def without_sector(from_deg, width_deg=30.0):
     return lambda points: points[(bearing_deg(points) - from_deg) % 360 >= width_deg]
+
+
+def closing(from_deg, width_deg, within_s):
+    """A sector whose far edge grows until the time given."""
+    return lambda points, since_s: without_sector(from_deg, width_deg * min(since_s / within_s, 1.0))(points)
+
+
+def fading(from_deg, width_deg, within_s):
+    """A sector that loses more and more returns, by chance, until the time given."""
+
+    def fault(points, since_s):
+        rng = np.random.default_rng(round(10 * since_s))
+        inside = (bearing_deg(points) - from_deg) % 360 < width_deg
+        return points[~(inside & (rng.random(len(points)) < since_s / within_s))]
+
+    return fault
 
 
 def followed(history, samples, name):
@@ -121,6 +139,45 @@ def test_a_blocked_sector_of_30_deg_is_named_within_20_s(from_deg, from_s):
     assert 0 <= (first_deg - from_deg) % 360 < 5
 
 
+@pytest.mark.parametrize("within_s", [5.0, 15.0, 30.0, 60.0])
+@pytest.mark.parametrize("width_deg", [30.0, 60.0, 90.0, 180.0])
+@pytest.mark.parametrize("from_deg", [0.0, 123.0])
+def test_a_sector_that_closes_slowly_is_named_within_15_s(from_deg, width_deg, within_s):
+    begin_s = 10.0
+    closed_s = begin_s + within_s * 30.0 / width_deg
+    samples = looks(None, begin_s, closed_s + 15.0, slow_fault=closing(from_deg, width_deg, within_s))
+    first_s, (first_deg, _) = next(
+        each for each in blocked_deg(SectorHistory(SENSOR, LastingTuning()), samples) if each[1]
+    )
+    assert first_s > closed_s - 5.0
+    assert 0 <= (first_deg - from_deg) % 360 < 5
+
+
+@pytest.mark.parametrize("within_s", [5.0, 60.0])
+@pytest.mark.parametrize("width_deg", [30.0, 180.0])
+def test_a_sector_that_fades_is_named_within_15_s_of_its_last_return(width_deg, within_s):
+    samples = looks(None, 10.0, 25.0 + within_s, slow_fault=fading(20.0, width_deg, within_s))
+    first_deg, last_deg = blocked_deg(SectorHistory(SENSOR, LastingTuning()), samples)[-1][1]
+    assert (first_deg, last_deg) == (20, 20 + width_deg)
+
+
+def test_a_drop_to_which_the_robot_drives_is_not_reported():
+    def before_drop(points, since_s):
+        """The returns of the ground before a drop to the left, and nothing beyond it."""
+        to_drop_m = max(12.0 - since_s, 1.5)
+        return points[points[:, 1] < to_drop_m]
+
+    found = blocked_deg(SectorHistory(SENSOR, LastingTuning()), looks(None, 5.0, 60.0, slow_fault=before_drop))
+    assert not any(blocked for _, blocked in found)
+
+
+def test_a_view_that_ends_slowly_where_no_ground_was_met_is_not_reported():
+    high = lambda points: points[points[:, 2] > -0.1 * np.hypot(points[:, 0], points[:, 1])]  # noqa: E731
+    closing_high = lambda points, since_s: high(closing(0.0, 90.0, 30.0)(points, since_s))  # noqa: E731
+    samples = [*looks(high, seconds=9.6), *looks(None, 9.6, 60.0, slow_fault=closing_high)][16:]
+    assert not any(blocked for _, blocked in blocked_deg(SectorHistory(SENSOR, LastingTuning()), samples))
+
+
 def test_no_sector_is_blocked_where_all_return():
     assert not any(blocked for _, blocked in blocked_deg(SectorHistory(SENSOR, LastingTuning()), looks()))
 
@@ -136,15 +193,16 @@ def test_a_view_that_is_narrow_by_design_is_not_reported():
     assert not any(blocked for _, blocked in found)
 
 
-def test_a_wall_nearer_than_the_sensor_sees_is_not_reported():
-    def beside_wall(points):
+@pytest.mark.parametrize("within_s", [0.1, 30.0])
+def test_a_wall_nearer_than_the_sensor_sees_is_not_reported(within_s):
+    def beside_wall(points, since_s):
         """A wall to the left whose parts ahead and behind are just in range."""
-        points = without_sector(60.0, 60.0)(points)
+        points = closing(60.0, 60.0, within_s)(points, since_s)
         edge_deg = np.repeat([58.0, 122.0], 40)
         xy = 0.8 * np.stack([np.cos(np.deg2rad(edge_deg)), np.sin(np.deg2rad(edge_deg))], axis=1)
         return np.concatenate([points, np.column_stack([xy, np.zeros((80, 2))])]).astype(np.float32)
 
-    found = blocked_deg(SectorHistory(SENSOR, LastingTuning()), looks(beside_wall, 9.0))
+    found = blocked_deg(SectorHistory(SENSOR, LastingTuning()), looks(None, 9.0, slow_fault=beside_wall))
     assert not any(blocked for _, blocked in found)
 
 

@@ -19,6 +19,8 @@ BESIDE = 3
 """Parts of a turn beside a sector in which a wall would go on."""
 LEVEL_SHARE = 0.3
 """Share of its range that a return of a wall is below the sensor at most; lower ones are of the ground."""
+EDGE = 2
+"""Parts of a turn beside a covered sector that are whole. The ground before a drop ends less sharply."""
 
 
 class BeamHistory:
@@ -89,10 +91,12 @@ class BeamHistory:
 class SectorHistory:
     """Narrow sectors in which there are no returns at all.
 
-    A view that is blocked ends from one look to the next. One that ends slowly ends at a crest. A wall closer than
-    the minimum range also leaves a dark sector, but its farther parts return beside it, so such a sector is not
-    blocked. Sensors with a long minimum range are not judged by lost returns, since anything may stand within it. A
-    sector that never had a return is blocked as well, unless the profile knows of it.
+    A view that is blocked ends from one look to the next, or slowly where it had met the ground. Then its edges are
+    sharp, as those of a drop, of water or of a crest seldom are.
+
+    A wall closer than the minimum range also leaves a dark sector, but its farther parts return beside it, so such a
+    sector is not blocked. Sensors with a long minimum range are not judged by lost returns, since anything may stand
+    within it. A sector that never had a return is blocked as well, unless the profile knows of it.
 
     Args:
         sensor: its blind sectors.
@@ -104,33 +108,62 @@ class SectorHistory:
         self._began_s: float | None = None
         self._sees_near = sensor.min_range_m < tuning.nearest_m
         self._near_m = tuning.near_share * max(sensor.min_range_m, NEAREST_M)
-        self._usual: Float64 = np.zeros(BEARINGS)  # returns of a look
-        self._last: Float64 = np.zeros(BEARINGS)  # those of the last look
+        self._looks = 0
+        self._usual: Float64 = np.zeros((2, BEARINGS))  # returns of a look: all, and those far below the sensor
+        self._last: Float64 = np.zeros(BEARINGS)  # all returns of the last look
         self._ever: Bool = _within(sensor.blind_sectors_deg or ())  # had returns, or is known to be blind
-        self._dark_since_s: Float64 = np.full(BEARINGS, np.inf)  # infinite where the view has not ended at once
+        self._empty_since_s: Float64 = np.full(BEARINGS, np.inf)  # infinite where no ground was met before
+        self._dark_since_s: Float64 = np.full(BEARINGS, np.inf)  # infinite where the view has not ended
         self.blocked_deg: tuple[int, int] | None = None  # bearings from and to, counter-clockwise
 
     def add(self, sample: Sample) -> None:
         """Look at the returns of a sweep."""
         tuning = self._tuning
         now_s = sample.time_s
-        count = np.bincount(part_of_turn(sample.turn, BEARINGS), minlength=BEARINGS).astype(np.float64)
+        count = _counted(sample)
         if self._began_s is None:
             self._began_s = now_s
-            self._usual = count
-        self._ever |= count > 0
-        was_whole = self._last >= tuning.whole_share * self._usual
-        ended = (count == 0) & (self._usual >= tuning.least_usual) & was_whole & self._sees_near
-        dark = (ended | np.isfinite(self._dark_since_s)) & (count <= tuning.lit_share * self._usual)
-        self._dark_since_s = np.where(dark, np.minimum(self._dark_since_s, now_s), np.inf)
-        self._usual = np.where(dark, self._usual, self._usual + tuning.gain * (count - self._usual))
-        self._last = count
+        self._ever |= count[0] > 0
+        expected = self._usual >= tuning.least_usual * sample.weight
+        empty = expected & (count[0] == 0) & self._sees_near
+        self._empty_since_s = np.where(empty[1], np.minimum(self._empty_since_s, now_s), np.inf)
+        ended = empty[0] & (self._last >= tuning.whole_share * self._usual[0])
+        covered = self._covered(count[1], sample)
+        known = np.isfinite(self._dark_since_s)
+        dark = (ended | covered | known) & (count[0] <= tuning.lit_share * self._usual[0])
+        since_s = np.where(covered, self._empty_since_s, now_s)
+        self._dark_since_s = np.where(dark, np.minimum(self._dark_since_s, since_s), np.inf)
+        self._looks += 1
+        gain = max(tuning.gain, 1 / self._looks)
+        self._usual = np.where(dark | empty[1], self._usual, self._usual + gain * (count - self._usual))
+        self._last = count[0]
         blocked = self._dark_since_s <= now_s - tuning.dark_s
         if now_s - self._began_s >= tuning.window_s and not self._ever.all():
             never = ~self._ever
             by_design = _longest_run(never)[1] > tuning.most_bearings
             blocked |= never & (not by_design)
         self.blocked_deg = self._blocked(blocked, sample.raw) if blocked.any() else None
+
+    def _covered(self, n_down: Float64, sample: Sample) -> Bool:
+        """(BEARINGS,) parts of the widest sector that ended, however slowly, if a cover explains it.
+
+        Args:
+            n_down: (BEARINGS,) returns of this look from far below the sensor.
+            sample: the sweep.
+        """
+        tuning = self._tuning
+        empty = np.isfinite(self._empty_since_s)
+        covered = np.zeros(BEARINGS, np.bool_)
+        first, n = _longest_run(empty)
+        run = (first + np.arange(n)) % BEARINGS
+        lasting = self._empty_since_s[run] <= sample.time_s - tuning.dark_s
+        if np.count_nonzero(lasting) < tuning.least_bearings:
+            return covered
+        beside = np.stack([first - 1 - np.arange(EDGE), (first + n + np.arange(EDGE)) % BEARINGS])
+        usual = np.maximum(self._usual[1, beside], tuning.least_usual * sample.weight)
+        sharp = n_down[beside].sum(axis=1) >= tuning.edge_share * usual.sum(axis=1)
+        covered[run] = sharp.all() and not self._has_near(sample.raw, first, n)
+        return covered
 
     def _blocked(self, blocked: Bool, raw: Float32) -> tuple[int, int] | None:
         """The widest sector of blocked parts of a turn (BEARINGS,), unless it is narrow or a wall hides it."""
@@ -148,6 +181,14 @@ class SectorHistory:
         near = (range_m > 0) & (range_m < self._near_m) & (z > -LEVEL_SHARE * range_m)
         bearing = part_of_turn(turn_of(x[near], y[near]), BEARINGS)
         return bool(((bearing - first + BESIDE) % BEARINGS < n + 2 * BESIDE).any())
+
+
+def _counted(sample: Sample) -> Float64:
+    """(2, BEARINGS) returns of a sweep in each part of a turn: all, and those far below the sensor."""
+    part = part_of_turn(sample.turn, BEARINGS)
+    down = part[sample.far_below]
+    counts = [np.bincount(each, minlength=BEARINGS) for each in (part, down)]
+    return np.asarray(sample.weight * np.array(counts))
 
 
 def _within(sectors_deg: Sequence[float]) -> Bool:

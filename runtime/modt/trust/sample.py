@@ -20,6 +20,9 @@ OBSTACLE_M = (0.35, 1.8)
 """Heights above the ground between which a point belongs to an obstacle, not to ground or ceiling [m]."""
 NEAREST_M = 0.7
 """Greatest distance of what covers the sensor and is no return [m]."""
+DOWN_SHARE = 0.12
+"""Share of its range by which a return is far below the sensor, which level ground returns. A ramp seldom tilts the
+sensor by more."""
 SECTORS = 24
 """Parts of a turn, counted from behind and counter-clockwise."""
 GROUND_HEIGHTS = 8.0
@@ -106,6 +109,12 @@ class Sample:
     def sector(self) -> Int:
         """(c,) sectors of the returns."""
         return part_of_turn(self.turn, SECTORS)
+
+    @cached_property
+    def far_below(self) -> Bool:
+        """(c,) whether a return is far below the sensor, as of the ground nearby or of what stands on it."""
+        below: Bool = self.xyz[2] < -DOWN_SHARE * self.range_m
+        return below
 
     @cached_property
     def seen(self) -> Bool:

@@ -15,6 +15,7 @@ from modt.trust.mount import MountHistory
 from modt.trust.returns import Loss, ReturnsCheck
 from modt.trust.sample import Sample, Three, sample
 from modt.trust.scene import SceneCheck
+from modt.trust.thinning import ThinningHistory
 from modt.trust.tuning import TrustTuning
 from modt.types import Float64, Frame, Reason, Trust, TrustLevel
 
@@ -87,6 +88,7 @@ class TrustWatch:
         self._scene = SceneCheck(tuning.scene)
         self._beams = BeamHistory(sensor, tuning.lasting)
         self._sectors = SectorHistory(sensor, tuning.lasting)
+        self._thinning = ThinningHistory(tuning.thinning)
         self._samples: list[Sample] = []  # the last MOST_SAMPLES + 1 at most since the last look, its own included
         self._debounced = Debounced(tuning.looks, tuning.back_looks)
         self._looked_s = -np.inf
@@ -153,6 +155,7 @@ class TrustWatch:
         if not own_findings and not own_reasons:
             self._returns.learn(sweep, elapsed_s)
             self._ground.learn(sweep)
+            self._thinning.add(sweep)
             if self._ground.known:
                 self._mount.add(self._ground.plane, sweep.R_level_sensor)
         self._samples = self._samples[-1:]
@@ -198,11 +201,14 @@ class TrustWatch:
             yield "scene", Finding(TrustLevel.BLIND, f"the scene is {change} against the one before", MOUNT)
 
     def _lasting_findings(self) -> Iterator[tuple[str, Finding]]:
-        """Findings of the histories of beams and narrow sectors, as they stand."""
+        """Findings of the histories over seconds and minutes, as they stand."""
         if dead_deg := self._beams.dead_deg:
             which = ", ".join(f"{each_deg:.1f}" for each_deg in dead_deg)
             what = f"no returns from the beam{'s' * (len(dead_deg) > 1)} at {which} deg of elevation"
             yield "beams", Finding(TrustLevel.DEGRADED, what, REPAIR)
+        if missing_share := self._thinning.missing_share:
+            what = f"{100 * missing_share:.0f} % of the returns from below are missing, in all directions"
+            yield "fading", Finding(TrustLevel.DEGRADED, what, CLEAN)
         if self._mount.is_tilted:
             what = f"the ground has tilted by {self._mount.tilt_deg:.0f} deg since the start"
             yield "mount", Finding(TrustLevel.BLIND, what, MOUNT)
