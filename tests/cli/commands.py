@@ -39,11 +39,11 @@ def succeeded(*arguments: object, **options) -> subprocess.CompletedProcess[str]
     return done
 
 
-def begin(*arguments: object, cwd: Path, env: dict[str, str] | None = None) -> subprocess.Popen[str]:
+def begin(*arguments: object, cwd: Path, env: dict[str, str] | None = None, **options) -> subprocess.Popen[str]:
     """Start a command and leave it running."""
     command = [sys.executable, "-m", "modt.cli.main", *map(str, arguments)]
-    pipe = subprocess.PIPE
-    return subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, env=env or environment(), cwd=cwd)
+    options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, **options}
+    return subprocess.Popen(command, env=env or environment(), cwd=cwd, **options)
 
 
 def here(command: str, *words: object, program=main) -> int:

@@ -1,7 +1,11 @@
 """`modt batch`: one dataset, whoever computes it and however often it is stopped."""
 
+import os
+import shutil
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -21,7 +25,7 @@ from modt_batch.recording import MEASURED
 from modt_batch.report import mean, worst_first
 from modt_simulation.synthetic_stream import SyntheticStream
 from tests import recorded
-from tests.cli.commands import content, environment, here, modt, refusal
+from tests.cli.commands import begin, content, environment, here, modt, refusal
 from tests.sources.datasets import Sweep, write_nuscenes
 
 pytestmark = pytest.mark.slow
@@ -116,6 +120,55 @@ def test_a_stopped_batch_goes_on_and_nothing_is_done_twice_or_missing(drives, wh
     assert contents(out) == contents(whole)
     assert local(drives, out) == 0
     assert len(replayed) == 7
+
+
+def committed(out):
+    """Names of the runs of a dataset, with the times at which they were written."""
+    return {path.name: path.stat().st_mtime_ns for path in (out / "runs").glob("[!.]*")}
+
+
+def wait_for_a_run(out):
+    """Until a run is committed."""
+    until_s = time.monotonic() + HANGS_S
+    while not committed(out):
+        assert time.monotonic() < until_s, "no run is committed"
+        time.sleep(0.02)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_ctrl_c_keeps_the_runs_that_are_done_and_they_are_not_done_again(drives, whole, tmp_path, jobs):
+    out = tmp_path / "out"
+    endless = tmp_path / "endless"  # a recording that is not at its end when the signal comes
+    endless.mkdir()
+    scan = min(drives[0].iterdir())
+    for k in range(5000):
+        (endless / f"{k:06d}.bin").symlink_to(scan)
+    options = ("--jobs", jobs, "--pages", 0)
+    batch = begin(*words([*drives, endless], out, *options), cwd=tmp_path, start_new_session=True)
+    try:
+        wait_for_a_run(out)
+        os.killpg(batch.pid, signal.SIGINT)  # as a terminal does, with the workers among the receivers
+        _, errors = batch.communicate(timeout=HANGS_S)
+    finally:
+        batch.kill()
+    assert batch.returncode == 130
+    assert "Traceback" not in errors
+    before = committed(out)
+    assert 1 <= len(before) <= 6
+    assert local(drives, out) == 0
+    assert contents(out) == contents(whole)
+    assert before.items() <= committed(out).items()
+
+
+def test_paths_may_have_spaces_and_quotes(drives, whole, tmp_path):
+    odd = shutil.copytree(drives[0], tmp_path / """it's a "drive" & <more>""")
+    out = tmp_path / """the "out's" place"""
+    assert here(*words([odd], out, "--jobs", 1, "--pages", 1)) == 0
+    runs = parquet.read_table(out / "runs").to_pylist()
+    assert [(row["address"], row["mode"]) for row in runs] == [(str(odd), "accurate"), (str(odd), "conventional")]
+    assert {row["run"] + ".parquet" for row in runs} == set(committed(out))
+    (page,) = (out / "pages").iterdir()
+    assert f'href="pages/{page.name}"' in (out / "report.html").read_text()
 
 
 def test_a_recording_that_fails_leaves_the_others_and_is_tried_again(drives, whole, tmp_path, capsys):
