@@ -253,6 +253,20 @@ def test_what_cannot_be_run_is_refused(arguments, cause, tmp_path, monkeypatch, 
     assert cause in refusal(capsys, "batch", *arguments)
 
 
+THREADS = """
+from modt.cli.main import main
+main(["batch", "gone", "--out", "out"])
+import pyarrow
+print(pyarrow.cpu_count())
+"""
+
+
+def test_arrow_has_one_thread_whatever_the_number_of_cores(tmp_path):
+    options = {"cwd": tmp_path, "env": environment(), "capture_output": True, "text": True, "timeout": HANGS_S}
+    done = subprocess.run([sys.executable, "-c", THREADS], check=False, **options)
+    assert (done.returncode, done.stdout) == (0, "1\n"), done.stderr
+
+
 def test_a_missing_extra_is_named(tmp_path, monkeypatch, capsys, drives):
     monkeypatch.setitem(sys.modules, "distributed", None)
     assert "pip install '.[batch]'" in refusal(capsys, *words(drives, tmp_path / "out", "--jobs", 2))
