@@ -12,16 +12,16 @@ import numpy as np
 from modt.errors import MisuseError, install
 from modt.geometry import inverse, rotation_of, se3
 from modt.sources.file_names import files_in
-from modt.sources.scan_file import ScanReference, ScanStream
+from modt.sources.point_cloud_file import points_of
+from modt.sources.scan_file import NO_POSES, ScanReference, ScanStream
 from modt.sources.stream import StreamInfo
-from modt.types import Float64
+from modt.types import Float32, Float64
 
 SWEEPS = Path("sensors/lidar")
 POSES = "city_SE3_egovehicle.feather"
 CALIBRATION = Path("calibration/egovehicle_SE3_sensor.feather")
 LIDAR = "up_lidar"
 PLACEMENT = ("qx", "qy", "qz", "qw", "tx_m", "ty_m", "tz_m")
-NO_POSES = "no odometry, ego-motion is estimated from the proposals"
 Columns = dict[str, Any]
 
 
@@ -118,7 +118,10 @@ def read_columns(path: Path, names: tuple[str, ...]) -> Columns:
         ) from None
 
 
-def read_sweep(path: Path) -> Float64:
-    """(N, 4) points of a sweep in the vehicle's frame, and reflectance from 0 to 255."""
-    table = read_columns(path, ("x", "y", "z", "intensity"))
-    return np.column_stack([table[name] for name in ("x", "y", "z", "intensity")]).astype(np.float64)
+def read_sweep(path: Path, T_sensor_vehicle: Float64 | None) -> Float32:
+    """(N, 4) points and reflectance of a sweep; they stay in the vehicle's frame without a (4, 4) transform.
+
+    Raises:
+        MisuseError: as `read_columns`.
+    """
+    return points_of(read_columns(path, ("x", "y", "z", "intensity")), T_sensor_vehicle)

@@ -19,7 +19,7 @@ from modt.errors import MisuseError
 from modt.sources import kitti_calibration
 from modt.sources.file_names import files_in, seconds_ns, time_ns, times_ns
 from modt.sources.pose_file import read_poses, sensor_poses
-from modt.sources.scan_file import PERIOD_S, ScanReference, ScanStream
+from modt.sources.scan_file import NO_POSES, PERIOD_S, ScanReference, ScanStream
 from modt.sources.stream import StreamInfo
 from modt.types import Float64
 
@@ -29,7 +29,6 @@ MAX_SWEEP_PERIODS = 2
 """Greatest duration of a sweep [periods]; a longer one is attributed to wrong time stamps."""
 NO_SWEEP_TIMES = "sweeps are not deskewed"
 NO_CAMERA = "no camera, no --fov camera"
-NO_POSES = "no odometry, ego-motion is estimated from the proposals"
 
 T = TypeVar("T")
 Poses = dict[int, Float64]
@@ -107,7 +106,7 @@ def scan_folder(folder: Path, period_s: float = PERIOD_S, suffix: str = ".bin") 
     notes = [f"folder of scans: no calibration, frames {apart}"]
     began_s = 0.0 if times is None else times[0] / 1e9
     info = StreamInfo(folder.name, "folder of scans", period_s=period_s, began_s=began_s)
-    poses: dict[int, Float64] = {}
+    poses: Poses = {}
     T_sensor_file: dict[int, Float64] = {}
     if suffix == ".pcd":
         from modt.sources.viewpoints import viewpoints_of

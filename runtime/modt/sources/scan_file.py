@@ -46,16 +46,11 @@ def read_scan(path: Path, T_sensor_file: Float64 | None = None) -> tuple[Float32
         cause = f"larger than {MAX_BYTES >> 20} MiB"
         raise ScanError(path, cause, "the frame is skipped; it is no sweep of a sensor")
     if path.suffix == ".feather":
-        return sanitised(_read_feather(path, T_sensor_file), path)
-    if path.suffix not in (".pcd", ".ply"):
-        return sanitised(_read_rows(path, raw), path)
-    from modt.sources.point_cloud_file import CloudError, read_pcd, read_ply
-
-    try:
-        points = read_pcd(raw, T_sensor_file) if path.suffix == ".pcd" else read_ply(raw)
-    except CloudError as error:
-        remedy = "the frame is skipped; convert it to x, y, z [m] and reflectance"
-        raise ScanError(path, str(error), remedy) from None
+        points = _read_feather(path, T_sensor_file)
+    elif path.suffix in (".pcd", ".ply"):
+        points = _read_cloud(path, raw, T_sensor_file)
+    else:
+        points = _read_rows(path, raw)
     return sanitised(points, path)
 
 
@@ -63,12 +58,19 @@ def _read_feather(path: Path, T_sensor_file: Float64 | None) -> Float32:
     from modt.sources.argoverse import read_sweep
 
     try:
-        points = read_sweep(path)
+        return read_sweep(path, T_sensor_file)
     except MisuseError as error:
         raise ScanError(path, error.cause, "the frame is skipped; restore it") from None
-    if T_sensor_file is not None:
-        points[:, :3] = points[:, :3] @ T_sensor_file[:3, :3].T + T_sensor_file[:3, 3]
-    return points.astype(np.float32)
+
+
+def _read_cloud(path: Path, raw: bytes, T_sensor_file: Float64 | None) -> Float32:
+    from modt.sources.point_cloud_file import CloudError, read_pcd, read_ply
+
+    try:
+        return read_pcd(raw, T_sensor_file) if path.suffix == ".pcd" else read_ply(raw)
+    except CloudError as error:
+        remedy = "the frame is skipped; convert it to x, y, z [m] and reflectance"
+        raise ScanError(path, str(error), remedy) from None
 
 
 def _read_rows(path: Path, raw: bytes) -> Float32:
@@ -133,6 +135,8 @@ def _flawless(points: Float32) -> bool:
 
 PERIOD_S = 0.1
 """Time between scans that have no stamps [s]."""
+NO_POSES = "no odometry, ego-motion is estimated from the proposals"
+"""Consequence of missing poses, for notes."""
 
 
 @dataclass(frozen=True)
