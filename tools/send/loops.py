@@ -12,7 +12,7 @@ import numpy as np
 
 from modt.errors import MisuseError
 from modt.sources.drivers import hesai, livox
-from modt.sources.drivers.velodyne import STAMP_AT, azimuths
+from modt.sources.drivers.velodyne import AZIMUTHS, STAMP_AT
 from modt.sources.packets.packet_decoder import import_extra
 from modt.sources.packets.turn_decoder import TURN
 from tools.send.faults import Timed
@@ -24,9 +24,10 @@ def endless(payloads: Sequence[bytes]) -> Iterator[Timed]:
     Raises:
         MisuseError: the packets hold no whole turn of a head, or are an Avia's.
     """
-    if livox.sender_of(payloads[0]) == livox.AVIA:
+    sender = livox.sender_of(payloads[0])
+    if sender == livox.AVIA:
         raise MisuseError("capture", "packets of an Avia are not repeated", "give --once")
-    return livox_loop(payloads) if livox.is_packet(payloads[0]) else turn_loop(payloads)
+    return turn_loop(payloads) if sender is None else livox_loop(payloads)
 
 
 def livox_loop(payloads: Sequence[bytes]) -> Iterator[Timed]:
@@ -71,7 +72,7 @@ class VelodyneStamps:
 
     def azimuth(self, payload: bytes) -> int:
         """Azimuth of the first block [0.01 deg]."""
-        return azimuths(payload)[0]
+        return int(AZIMUTHS.unpack_from(payload)[0])
 
     def stamp_us(self, payload: bytes) -> int:
         """Time of the packet [us]."""

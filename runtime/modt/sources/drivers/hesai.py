@@ -253,7 +253,7 @@ def _decoder(name: str, options: Mapping[str, str], host: str) -> HesaiDecoder:
 DRIVER = Driver(
     maker=HesaiDecoder.maker,
     port=2368,
-    recognises=lambda payload: model_of(payload) is not None,
+    recognises=HesaiDecoder.accepts,
     decoder=_decoder,
     options={"calibration": "FILE"},
     beside={"calibration": ".csv"},

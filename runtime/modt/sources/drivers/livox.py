@@ -80,9 +80,10 @@ class LivoxDecoder(PacketDecoder):
     _before_ns: int | None  # time of the last packet of the sweep before; None where it was not received
     _packets: dict[int, bytes]  # packets of the present sweep by their time [ns]
 
-    def accepts(self, payload: bytes) -> bool:
+    @staticmethod
+    def accepts(payload: bytes) -> bool:
         """Whether a payload is a packet of points of a Livox."""
-        return is_packet(payload)
+        return sender_of(payload) is not None
 
     def decode(self, received_s: float, payload: bytes) -> Sequence[Sweep]:
         """Sweeps completed by a packet."""
@@ -146,11 +147,6 @@ class LivoxDecoder(PacketDecoder):
         return [Sweep(stamp_s, np.concatenate(parts), complete=lost == 0, delay_s=delay_s)]
 
 
-def is_packet(payload: bytes) -> bool:
-    """Whether a payload is a packet of points of a Livox."""
-    return sender_of(payload) is not None
-
-
 def sender_of(payload: bytes) -> str | None:
     """Profile of the sensor that sent a packet; None if it is no packet of points of a Livox."""
     if len(payload) <= HEADER.size:
@@ -212,6 +208,6 @@ def _xyz(best: NDArray[Any], angles: NDArray[Any]) -> tuple[Float64, Float64, Fl
 DRIVER = Driver(
     maker="Livox",
     port=56301,
-    recognises=is_packet,
+    recognises=LivoxDecoder.accepts,
     decoder=lambda name, _options, _host: LivoxDecoder(name),
 )

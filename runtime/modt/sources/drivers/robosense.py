@@ -303,7 +303,7 @@ def _decoder(name: str, options: Mapping[str, str], _host: str) -> RobosenseDeco
 DRIVER = Driver(
     maker=RobosenseDecoder.maker,
     port=6699,
-    recognises=lambda payload: signature_of(payload) is not None,
+    recognises=RobosenseDecoder.accepts,
     decoder=_decoder,
     options={"calibration": "FILE"},
     beside={"calibration": ".csv"},

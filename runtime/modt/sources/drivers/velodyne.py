@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -114,30 +113,21 @@ def signature_of(payload: bytes) -> Signature | None:
     return Signature(banks, None if banks == UPPER_LOWER else payload[IDENTITY_AT])
 
 
-def azimuths(payload: bytes) -> tuple[int, int]:
-    """Azimuths of the first and the last block [0.01 deg]."""
-    first, *_, last = AZIMUTHS.unpack_from(payload)
-    return first, last
+def recognised(signature: Signature, payloads: Sequence[bytes], name: str, declared: Model | None) -> Model | None:
+    """Model that sent the packets of a signature among the payloads, or the declared one; None where it is unknown.
 
-
-def recognised(payloads: Sequence[bytes], name: str, declared: Model | None) -> tuple[Model | None, Signature | None]:
-    """Model that sent most of some packets, or the declared one, and the signature of those packets.
-
-    The model is None where it is unknown. Where the identity of the packets contradicts their pace, the pace decides.
-    A contradiction is logged as a warning.
+    Where the identity of the packets contradicts their pace, the pace decides. A contradiction is logged as a
+    warning.
     """
-    signatures = [signature_of(payload) for payload in payloads]
-    signature, _ = Counter(signatures).most_common(1)[0]
     stated = next((model for model in MODELS if model.signature == signature), None)
-    alike = [payload for payload, other in zip(payloads, signatures, strict=True) if other == signature]
-    paced = _by_pace(alike, stated)
+    paced = _by_pace([payload for payload in payloads if signature_of(payload) == signature], stated)
     used = declared or paced
     if used is not None and not (used.signature == signature and (paced is stated or stated is None)):
         facts = f"its packets say {stated.name if stated else 'nothing known'}"
         pace = f" at the pace of {paced.name}" if paced is not stated and paced is not None else ""
         remedy = "leave model= out to have it recognised" if declared else "give model= to overrule"
         log.warning("%s: %s%s; decoded as %s; %s", name, facts, pace, used.name, remedy)
-    return used, signature
+    return used
 
 
 def _by_pace(payloads: Sequence[bytes], stated: Model | None) -> Model | None:
@@ -180,8 +170,8 @@ class VelodyneDecoder(TurnDecoder):
         except Exception as error:  # errors of the library's YAML parser have no common type
             raise MisuseError(calibration, f"no calibration ({one_line(error)})", remedy) from None
 
-    def _recognise(self, _signature: Signature, payloads: Sequence[bytes]) -> Signature | None:
-        model, signature = recognised(payloads, self.name, self._declared)
+    def _recognise(self, signature: Signature, payloads: Sequence[bytes]) -> Signature | None:
+        model = recognised(signature, payloads, self.name, self._declared)
         if model is None:
             return None
         self.profile = model.profile
@@ -199,7 +189,7 @@ class VelodyneDecoder(TurnDecoder):
     def _entry(self, received_s: float, payload: bytes) -> Entry:
         stamp_s = int.from_bytes(payload[STAMP_AT : STAMP_AT + 4], "little") * 1e-6
         time_s = self._clock.unwrapped(stamp_s, received_s - self._packet_s)  # it is sent when it is full
-        first, last = azimuths(payload)
+        first, *_, last = AZIMUTHS.unpack_from(payload)
         if self._identity is not None:  # the library refuses packets with a wrong identity
             payload = payload[:IDENTITY_AT] + self._identity
         return Entry.of(time_s, first, last, self._library.VelodynePacket(time_s, payload))
@@ -226,7 +216,7 @@ def _decoder(name: str, options: Mapping[str, str], _host: str) -> VelodyneDecod
 DRIVER = Driver(
     maker=VelodyneDecoder.maker,
     port=2368,
-    recognises=lambda payload: signature_of(payload) is not None,
+    recognises=VelodyneDecoder.accepts,
     decoder=_decoder,
     options={"model": "MODEL", "calibration": "FILE"},
     identified_by="model",

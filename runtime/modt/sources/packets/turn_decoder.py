@@ -197,9 +197,10 @@ class TurnDecoder(PacketDecoder):
     def _table(self, entries: Sequence[Entry]) -> Float32:
         """(N, 4 or more) x, y, z [m, sensor frame], reflectance, and other columns of the points in packets."""
 
-    def accepts(self, payload: bytes) -> bool:
+    @classmethod
+    def accepts(cls, payload: bytes) -> bool:
         """Whether a payload is a packet of points of this maker."""
-        return self.signature(payload) is not None
+        return cls.signature(payload) is not None
 
     def decode(self, received_s: float, payload: bytes) -> Sequence[Sweep]:
         """Sweeps completed by a packet."""
