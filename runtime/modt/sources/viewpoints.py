@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from modt.geometry import inverse
+from modt.geometry import inverse, se3
 from modt.sources.point_cloud_file import MAX_HEADER_BYTES, CloudError, read_pcd, viewpoint_of
 from modt.types import Float64
 
@@ -60,7 +60,8 @@ def _around_viewpoint(files: Mapping[int, Path], poses: Mapping[int, Float64]) -
         if np.linalg.norm(place) < FAR_M:
             continue
         try:
-            xyz = read_pcd(files[i].read_bytes(), _moved(-place))[:, :3]  # relative to the place, with full precision
+            # relative to the place, with full precision
+            xyz = read_pcd(files[i].read_bytes(), se3(np.eye(3), -place))[:, :3]
         except (OSError, CloudError):
             continue
         xyz = xyz[np.isfinite(xyz).all(axis=1)]
@@ -68,12 +69,6 @@ def _around_viewpoint(files: Mapping[int, Path], poses: Mapping[int, Float64]) -
         around_origin = np.median(np.linalg.norm(xyz + place.astype(np.float32), axis=1))
         votes.append(bool(around_place < around_origin))
     return 2 * sum(votes) > len(votes)
-
-
-def _moved(by_m: Float64) -> Float64:
-    T: Float64 = np.eye(4)
-    T[:3, 3] = by_m
-    return T
 
 
 def _head(path: Path) -> bytes:

@@ -103,7 +103,7 @@ class PointCloudReader:
         if cloud is None:
             return []
         if self._first is not None:
-            self._watch(cloud, message.sent_s)
+            self._watch(self._first, cloud, message.sent_s)
         if self._parts is not None:
             self.reception.joined += 1
             cloud = self._parts.add(cloud, message.sent_s)
@@ -121,9 +121,8 @@ class PointCloudReader:
             )
         ]
 
-    def _watch(self, cloud: PointCloud, sent_s: float) -> None:
-        """Keep a message until it is known whether messages are parts of turns."""
-        first = [] if self._first is None else self._first
+    def _watch(self, first: list[tuple[PointCloud, float]], cloud: PointCloud, sent_s: float) -> None:
+        """Add a message to the first ones, until it is known whether they are parts of turns."""
         first.append((cloud, sent_s))
         if len(first) <= WATCHED and TurnParts.may_be([one for one, _ in first]):
             return

@@ -45,7 +45,7 @@ class Fragments:
         payload = self._joined(key, 8 * (flags & OFFSET), raw[header_bytes:end], bool(flags & MORE))
         if payload is None:
             return None
-        return ".".join(map(str, raw[12:16])), raw[9], payload
+        return socket.inet_ntoa(raw[12:16]), raw[9], payload
 
     def _whole_of_ipv6(self, raw: bytes) -> Packet | None:
         length = int.from_bytes(raw[4:6], "big")
