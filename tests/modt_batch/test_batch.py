@@ -160,15 +160,19 @@ def test_ctrl_c_keeps_the_runs_that_are_done_and_they_are_not_done_again(drives,
     assert before.items() <= committed(out).items()
 
 
-def test_paths_may_have_spaces_and_quotes(drives, whole, tmp_path):
-    odd = shutil.copytree(drives[0], tmp_path / """it's a "drive" & <more>""")
-    out = tmp_path / """the "out's" place"""
+def test_paths_may_have_spaces_quotes_and_brackets(drives, tmp_path):
+    odd = shutil.copytree(drives[0], tmp_path / """it's a "drive" [1] & <more>""")
+    out = tmp_path / """the "out's" place [1]"""
+    killed = out / "runs" / ".drive.parquet-0123abcd.part"
+    killed.parent.mkdir(parents=True)
+    killed.touch()
     assert here(*words([odd], out, "--jobs", 1, "--pages", 1)) == 0
     runs = parquet.read_table(out / "runs").to_pylist()
     assert [(row["address"], row["mode"]) for row in runs] == [(str(odd), "accurate"), (str(odd), "conventional")]
     assert {row["run"] + ".parquet" for row in runs} == set(committed(out))
     (page,) = (out / "pages").iterdir()
     assert f'href="pages/{page.name}"' in (out / "report.html").read_text()
+    assert not killed.exists()
 
 
 def test_a_recording_that_fails_leaves_the_others_and_is_tried_again(drives, whole, tmp_path, capsys):

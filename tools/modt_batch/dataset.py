@@ -24,6 +24,7 @@ TABLES = ("tracks", "ledger", RUNS)
 REQUEST = "batch.json"
 PAGES = "pages"
 SUFFIX = ".parquet"
+PARTIAL = ".part"
 
 
 class Dataset:
@@ -59,11 +60,7 @@ class Dataset:
 
     def committed(self) -> set[str]:
         """Names of the runs that it holds."""
-        with self._access():
-            folder = f"{self.root}/{RUNS}"
-            self._files.invalidate_cache(folder)
-            found = self._files.ls(folder, detail=False) if self._files.isdir(folder) else []
-        names = (name.rpartition("/")[2] for name in found)
+        names = (path.rpartition("/")[2] for path in self._paths_in(RUNS))
         return {name.removesuffix(SUFFIX) for name in names if name.endswith(SUFFIX) and not name.startswith(".")}
 
     def commit(self, name: str, files: Mapping[str, Path]) -> None:
@@ -86,10 +83,11 @@ class Dataset:
 
     def remove_unfinished(self) -> None:
         """Remove files that a killed worker was writing. No worker may be at work."""
-        with self._access():
-            for table in (*TABLES, PAGES):
-                for path in self._files.glob(f"{self.root}/{table}/.*.part"):
-                    self._files.rm_file(path)
+        for table in (*TABLES, PAGES):
+            for path in self._paths_in(table):
+                if path.endswith(PARTIAL):
+                    with self._access():
+                        self._files.rm_file(path)
 
     def runs(self) -> list[dict[str, Any]]:
         """Rows of the table of runs, in the order of their names."""
@@ -104,9 +102,16 @@ class Dataset:
         with self._access():
             return bool(self._files.exists(f"{self.root}/{place}"))
 
+    def _paths_in(self, folder: str) -> list[str]:
+        """Paths of the files in a folder of the dataset, whatever characters its address has."""
+        path = f"{self.root}/{folder}"
+        with self._access():
+            self._files.invalidate_cache(path)
+            return list(self._files.ls(path, detail=False)) if self._files.isdir(path) else []
+
     def _write(self, path: str, content: bytes) -> None:
         folder, _, name = path.rpartition("/")
-        partial = f"{folder}/.{name}-{uuid.uuid4().hex[:8]}.part"
+        partial = f"{folder}/.{name}-{uuid.uuid4().hex[:8]}{PARTIAL}"
         self._files.makedirs(folder, exist_ok=True)
         self._files.pipe_file(partial, content)
         self._files.mv(partial, path)
