@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import socket
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -40,11 +41,19 @@ def rng() -> np.random.Generator:
 
 
 @pytest.fixture
-def port() -> int:
+def ports() -> list[int]:
+    """Two ports for datagrams that are free."""
+    with ExitStack() as probes:
+        bound = [probes.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(2)]
+        for probe in bound:
+            probe.bind(("", 0))
+        return [int(probe.getsockname()[1]) for probe in bound]
+
+
+@pytest.fixture
+def port(ports: list[int]) -> int:
     """Port for datagrams that is free."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("", 0))
-        return int(probe.getsockname()[1])
+    return ports[0]
 
 
 @pytest.fixture(scope="session")

@@ -12,6 +12,7 @@ ODOMETRY = "nav_msgs/msg/Odometry"
 TF = "tf2_msgs/msg/TFMessage"
 BEGAN_S = 1_700_000_000.0
 UP = [0.0, 0.0, 0.0, 1.0]
+TWENTY = messages.xyzi(20)
 Recorded = list[tuple[str, str, float, bytes]]
 """Topic, type, time of the recording, message."""
 
@@ -48,8 +49,12 @@ def write_mcap(path, recorded, **options):
 def clouds(n=4, topic="/points"):
     """Sweeps 0.1 s apart, recorded 30 ms after their stamps."""
     stamps = [BEGAN_S + k / 10 for k in range(n)]
-    data = [messages.encode(messages.cloud(messages.xyzi(20 + k), stamp_s=s)) for k, s in enumerate(stamps)]
-    return [(topic, CLOUD, s + 0.03, raw) for s, raw in zip(stamps, data, strict=True)]
+    return [sweep(s + 0.03, messages.xyzi(20 + k), topic, stamp_s=s) for k, s in enumerate(stamps)]
+
+
+def sweep(recorded_s, points=TWENTY, topic="/points", **options):
+    """A recorded message of points."""
+    return (topic, CLOUD, recorded_s, messages.encode(messages.cloud(points, **options)))
 
 
 def poses(child="lidar", topic="/odom"):

@@ -15,7 +15,7 @@ from modt.errors import MisuseError, ModtError
 from modt.sources.recognise import open_stream
 from tests.ros2 import messages
 from tests.sources import layouts
-from tests.sources.bags import BEGAN_S, CLOUD, TF, UP, by_time, clouds, poses, write_mcap, write_rosbag2
+from tests.sources.bags import BEGAN_S, TF, UP, by_time, clouds, poses, sweep, write_mcap, write_rosbag2
 
 
 @pytest.fixture(params=[write_rosbag2, write_mcap])
@@ -103,7 +103,7 @@ def test_a_message_that_cannot_be_used_is_counted_and_skipped(opened, caplog):
     recorded = clouds()
     recorded[1] = (*recorded[1][:3], b"\0\1\0\0\1\2")
     recorded[2] = (*recorded[2][:3], recorded[0][3])  # stamped as the first one
-    recorded[3] = (*recorded[3][:3], messages.encode(messages.cloud(messages.xyzi(9), stamp_s=BEGAN_S - 5)))
+    recorded[3] = sweep(recorded[3][2], stamp_s=BEGAN_S - 5)
     stream = opened(recorded)
     assert [frame.index for frame in stream] == [0, 2]
     assert stream.faults.skipped == 2
@@ -112,19 +112,13 @@ def test_a_message_that_cannot_be_used_is_counted_and_skipped(opened, caplog):
 
 
 def test_a_driver_without_stamps_is_stamped_by_the_recording(opened):
-    raw = messages.encode(messages.cloud(messages.xyzi(20), stamp_s=0.0))
-    recorded = [("/points", CLOUD, BEGAN_S + k / 10, raw) for k in range(3)]
-    stream = opened(recorded)
+    stream = opened([sweep(BEGAN_S + k / 10, stamp_s=0.0) for k in range(3)])
     assert stamps_of(stream) == tenths(3)
 
 
 @pytest.mark.parametrize("unit_s", [0.0, 1e-3, 1e3])
 def test_stamps_that_stand_still_are_replaced_by_the_times_of_the_recording(opened, unit_s):
-    recorded = []
-    for k in range(6):
-        cloud = messages.cloud(messages.xyzi(20), stamp_s=1000.0 + k / 10 * unit_s)
-        recorded.append(("/points", CLOUD, BEGAN_S + k / 10, messages.encode(cloud)))
-    stream = opened(recorded)
+    stream = opened([sweep(BEGAN_S + k / 10, stamp_s=1000.0 + k / 10 * unit_s) for k in range(6)])
     assert stamps_of(stream) == tenths(6)
     assert "the stamps of the sweeps stand still" in stream.info.notes[0]
 
@@ -138,13 +132,8 @@ def test_a_sweep_that_is_recorded_twice_is_read_once(opened):
 
 @pytest.mark.parametrize("asked", [None, "rear"])
 def test_one_of_two_sensors_in_a_topic_is_read_and_the_other_counted(write, tmp_path, asked):
-    sweeps = {frame: messages.cloud(messages.xyzi(20), frame_id=frame) for frame in ("front", "rear")}
-    recorded = []
-    for k in range(12):
-        sweep = sweeps["rear" if k % 2 else "front"]
-        sweep.header.stamp.sec = int(BEGAN_S)
-        sweep.header.stamp.nanosec = 50_000_000 * k
-        recorded.append(("/points", CLOUD, BEGAN_S + k / 20, messages.encode(sweep)))
+    times_s = [BEGAN_S + k / 20 for k in range(12)]
+    recorded = [sweep(s, stamp_s=s, frame_id=("front", "rear")[k % 2]) for k, s in enumerate(times_s)]
     path = write(tmp_path / "drive", recorded)
     stream = open_stream(path, capture={} if asked is None else {"frame": asked})
     frames = list(stream)
@@ -159,8 +148,7 @@ def test_one_of_two_sensors_in_a_topic_is_read_and_the_other_counted(write, tmp_
 
 @pytest.mark.parametrize(("frame_id", "note"), [("camera_init", "record what"), ("eye_optical_frame", "of a camera")])
 def test_points_that_are_not_in_the_axes_of_a_sensor_are_noted(opened, frame_id, note):
-    raw = [messages.encode(messages.cloud(messages.xyzi(20), stamp_s=BEGAN_S + k, frame_id=frame_id)) for k in (0, 1)]
-    stream = opened([("/points", CLOUD, BEGAN_S + k, raw[k]) for k in (0, 1)])
+    stream = opened([sweep(BEGAN_S + k, stamp_s=BEGAN_S + k, frame_id=frame_id) for k in (0, 1)])
     assert note in stream.info.notes[0]
 
 
@@ -207,17 +195,15 @@ def test_topics_that_a_converter_wrote_one_after_the_other_are_merged(opened):
 
 
 def test_a_wrong_stamp_of_the_first_sweep_costs_it_alone(opened):
-    late = messages.encode(messages.cloud(messages.xyzi(20), stamp_s=BEGAN_S + 3600))
-    recorded = by_time([(*clouds()[0][:3], late)], clouds()[1:], poses())
-    frames = list(opened(recorded))
+    late = sweep(clouds()[0][2], stamp_s=BEGAN_S + 3600)
+    frames = list(opened(by_time([late], clouds()[1:], poses())))
     assert [frame.index for frame in frames] == [1, 2, 3]
     assert x_of(frames) == tenths(3, 10.1)
 
 
 def test_the_cause_of_unusable_clouds_is_named(write, tmp_path):
     rows = np.zeros((1, 5), [("x", "i2"), ("y", "i2"), ("z", "i2"), ("intensity", "u1")])
-    raw = messages.encode(messages.cloud(rows, stamp_s=BEGAN_S))
-    path = write(tmp_path / "drive", [("/points", CLOUD, BEGAN_S + k / 10, raw) for k in range(3)])
+    path = write(tmp_path / "drive", [sweep(BEGAN_S + k / 10, rows, stamp_s=BEGAN_S) for k in range(3)])
     with pytest.raises(ModtError, match=r"x \(int16\), y \(int16\), z \(int16\).*float32"):
         open_stream(path)
 
@@ -326,7 +312,7 @@ def static(topic):
     "others",
     [
         by_time(poses("base_link", NAMESPACE + "/odom"), static(NAMESPACE + "/tf_static")),
-        by_time(poses("base_link"), [(t, k, s, d) for t, k, s, d in moving("/tf", with_mount=True)]),
+        by_time(poses("base_link"), moving("/tf", with_mount=True)),
         by_time(moving("/tf"), static("/tf_static")),
         moving(NAMESPACE + "/tf", with_mount=True),
     ],
@@ -404,8 +390,7 @@ def test_parts_of_turns_that_are_recorded_out_of_order_are_joined_in_theirs(open
         seen = bearing[k % 3 * 1000 :][:1000]
         points["x"], points["y"] = 9 * np.cos(seen), 9 * np.sin(seen)
         stamp_s = BEGAN_S + k / 30
-        cloud = messages.encode(messages.cloud(points, stamp_s=stamp_s))
-        recorded.append(("/points", CLOUD, stamp_s + 0.03 + (apart + 0.5) / 30 * (k == 20), cloud))
+        recorded.append(sweep(stamp_s + 0.03 + (apart + 0.5) / 30 * (k == 20), points, stamp_s=stamp_s))
     stream = opened(by_time(recorded))
     frames = [*stream]
     assert len(frames) == 12

@@ -1,12 +1,15 @@
 """Scenes of nuScenes and logs of Argoverse 2, by name, with poses, axes and times."""
 
 import json
+import sys
 
 import numpy as np
 import pytest
 
 from modt.errors import MisuseError
+from modt.sources import nuscenes
 from modt.sources.recognise import open_scans, open_stream
+from tests.sources import layouts
 from tests.sources.datasets import BEGAN_US, MOUNT_M, Sweep, write_argoverse, write_nuscenes
 
 
@@ -68,8 +71,6 @@ def test_sweeps_that_are_not_unpacked_are_noted(tmp_path):
     for file in (root / "samples" / "LIDAR_TOP").iterdir():
         file.unlink()
     (root / "v1.0-mini" / "scene.json").touch()
-    from modt.sources import nuscenes
-
     nuscenes.read_scene.cache_clear()
     with pytest.raises(MisuseError, match=r"no sweeps of scene-0001; unpack"):
         open_scans(root)
@@ -130,14 +131,12 @@ def test_pyarrow_is_asked_for(tmp_path, monkeypatch):
     folder.mkdir(parents=True)
     (folder / "315966265259836000.feather").write_bytes(b"x")
     (tmp_path / "log" / "city_SE3_egovehicle.feather").write_bytes(b"x")
-    monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(MisuseError, match=r"needs pyarrow.*parquet"):
         open_scans(tmp_path / "log")
 
 
 def test_a_folder_of_cuboids_is_replayed_where_its_page_points(tmp_path):
-    from tests.sources import layouts
-
     layouts.write_scans(tmp_path / "scans", range(2))
     (tmp_path / "truth.csv").write_text("frame\n")
     assert len(open_scans(tmp_path).scans) == 2

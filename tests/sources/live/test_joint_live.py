@@ -2,7 +2,6 @@
 
 import socket
 import time
-from contextlib import ExitStack
 from itertools import islice
 from types import SimpleNamespace
 
@@ -143,18 +142,8 @@ def test_counts_of_both_are_added_and_kept_apart(pair):
     assert pair.source.reading.sweeps == 3
 
 
-def two_ports():
-    """Two ports for datagrams that are free."""
-    with ExitStack() as probes:
-        bound = [probes.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(2)]
-        for probe in bound:
-            probe.bind(("", 0))
-        return [probe.getsockname()[1] for probe in bound]
-
-
-def test_packets_to_two_ports_are_frames_of_one_robot():
+def test_packets_to_two_ports_are_frames_of_one_robot(ports):
     """Over loopback. Packets are sent until a frame has both sensors; no wait of the source ends before."""
-    ports = two_ports()
     sensors = [mounted(f"sensor-{port}", 0.0, 0.0, 0.0, f"velodyne://127.0.0.1:{port}") for port in ports]
     source = JointLive(sensors, [open_sensor(sensor.source) for sensor in sensors], clock=lambda: 0.0)
     source.start()

@@ -9,7 +9,7 @@ import pytest
 from modt.sources.live.live_stream import LiveStream
 from modt.sources.stream import Reception, StreamEndedError, StreamInfo, Sweep
 
-INFO = StreamInfo("sensor", "test", 0, None, 0.1, None, False)
+INFO = StreamInfo("sensor", "test")
 
 
 def scripted(*batches):

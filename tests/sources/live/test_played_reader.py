@@ -9,7 +9,7 @@ from modt.types import Frame
 
 
 class Recording(list):
-    info = StreamInfo("recording", "test", 0, 3, 0.1, None, False)
+    info = StreamInfo("recording", "test", n_frames=3)
     faults = Faults()
     reading = Reading()
 

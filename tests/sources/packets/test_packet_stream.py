@@ -38,15 +38,22 @@ def test_a_broken_end_is_a_fault_and_what_came_before_is_used(path, caplog):
     assert "frame 3: truncated within a record" in caplog.text
 
 
-def test_a_capture_whose_packets_were_cut_short_is_refused_for_that(path):
-    whole = path.read_bytes()
-    cut = whole[:24]
+def records_of(path):
+    """The head of a capture, and its records."""
+    raw = path.read_bytes()
+    records = []
     at = 24
-    while at < len(whole):
-        size = int.from_bytes(whole[at + 8 : at + 12], "little")
-        cut += whole[at : at + 8] + (96).to_bytes(4, "little") + whole[at + 12 : at + 16 + 96]
-        at += 16 + size
-    path.write_bytes(cut)
+    while at < len(raw):
+        size = 16 + int.from_bytes(raw[at + 8 : at + 12], "little")
+        records.append(raw[at : at + size])
+        at += size
+    return raw[:24], records
+
+
+def test_a_capture_whose_packets_were_cut_short_is_refused_for_that(path):
+    head, records = records_of(path)
+    cut = (record[:8] + (96).to_bytes(4, "little") + record[12 : 16 + 96] for record in records)
+    path.write_bytes(head + b"".join(cut))
     with pytest.raises(MisuseError, match=r"the ends of \d+ UDP datagrams were not captured.*tcpdump -s 0"):
         open_stream(path)
 
@@ -106,13 +113,7 @@ def test_an_ouster_is_recognised_by_the_metadata_beside_its_capture(kitti_root):
 
 def of_two(path):
     """The packets of a sensor, and those of another one from the half on."""
-    whole = path.read_bytes()
-    records = []
-    at = 24
-    while at < len(whole):
-        size = 16 + int.from_bytes(whole[at + 8 : at + 12], "little")
-        records.append(whole[at : at + size])
-        at += size
+    head, records = records_of(path)
     mixed = []
     for k, record in enumerate(records):
         mixed.append(record)
@@ -120,7 +121,7 @@ def of_two(path):
             other = bytearray(record)
             other[16 + 14 + 12 : 16 + 14 + 16] = bytes([192, 0, 2, 9])
             mixed.append(bytes(other))
-    path.write_bytes(whole[:24] + b"".join(mixed))
+    path.write_bytes(head + b"".join(mixed))
 
 
 def test_one_of_several_sensors_in_a_capture_is_chosen_and_the_others_are_named(path):

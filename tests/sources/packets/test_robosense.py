@@ -147,10 +147,8 @@ def test_a_capture_of_a_model_that_is_not_decoded_names_it(tmp_path):
         open_capture(tmp_path / "a.pcap", {})
 
 
-def test_a_live_sensor_tells_its_angles_on_another_port(port, request):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        difop_port = probe.getsockname()[1]
+def test_a_live_sensor_tells_its_angles_on_another_port(ports, request):
+    port, difop_port = ports
     decoder = RobosenseDecoder("sensor")
     reader = PacketReader(bound_socket("sensor", port), decoder, "127.0.0.1", clock=lambda: 0.0)  # no packet is late
     reader.descriptions = bound_socket("sensor", difop_port)
