@@ -1,7 +1,5 @@
 """Checks before the first frame: each outcome has its line and, where something is wrong, a remedy."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
@@ -11,8 +9,9 @@ from modt.energy.meters.discovery import Discovery
 from modt.energy.meters.meter import Candidate, Facts, Kind, Meter, Scope
 from modt.errors import MisuseError
 from modt.sources.live.live_stream import LiveStream
-from modt.sources.stream import Reception, StreamInfo, Sweep
+from modt.sources.stream import StreamInfo, Sweep
 from tests.energy.meter_files import write_files
+from tests.sources.live.readers import scripted
 
 
 def core(sys, isolated, number):
@@ -46,11 +45,8 @@ def near(height_m, **sensor):
 
 
 def sensor(sweeps, messages, **refused):
-    waiting = [sweeps]
-    reader = SimpleNamespace(profile=None, reception=Reception(messages, 0, refused), close=lambda: None)
-    reader.read = lambda timeout_s: waiting.pop() if waiting else []
-    info = StreamInfo("sensor", "test", 0, None, 0.1, None, False)
-    (found,) = checks.sensor(lambda: LiveStream(info, reader), 0.3)
+    reader = scripted(sweeps, messages=messages, refused=refused)
+    (found,) = checks.sensor(lambda: LiveStream(StreamInfo("sensor", "test"), reader), 0.3)
     return found
 
 

@@ -369,11 +369,11 @@ class Frames(list):
     faults = None
 
 
-def starts(work, period=0.1):
-    """Times at which frames begin that take so long."""
+def starts(work):
+    """Times at which frames of a replay at 10 Hz begin that take so long."""
     time = Time()
     out = list[float]()
-    playback = Playback(Frames(work), Ledger(), 1 / period, time.sleep, time)
+    playback = Playback(Frames(work), Ledger(), 10.0, time.sleep, time)
     for _ in work:
         seconds = playback.take(0.0).frame
         out.append(time.now - 100.0)

@@ -140,7 +140,7 @@ def _write_box(tables, token, sample, instance, box, of_instance):
     of_instance[instance] = row
 
 
-def write_argoverse(log, sweeps, began_ns=315_966_265_259_836_000):
+def write_argoverse(log, sweeps):
     """Write a log; boxes of a sweep have the vehicle's frame."""
     import pyarrow as pa
     from pyarrow import feather
@@ -153,7 +153,7 @@ def write_argoverse(log, sweeps, began_ns=315_966_265_259_836_000):
     def placed(rows):
         return {name: [row[k] for row in rows] for k, name in enumerate(names)}
 
-    times_ns = [began_ns + 1000 * sweep.time_us for sweep in sweeps]
+    times_ns = [315_966_265_259_836_000 + 1000 * sweep.time_us for sweep in sweeps]
     for time_ns, sweep in zip(times_ns, sweeps, strict=True):
         points = sweep.points[:, :3] + [1.35, 0.0, 1.64]
         columns = {name: points[:, k].astype(np.float16) for k, name in enumerate("xyz")}

@@ -10,9 +10,9 @@ TURN_S = 0.1
 N = 6000
 
 
-def turns(n, way=1.0, seed=0):
+def turns(n, way=1.0):
     """Bearing and time [s] of the points of turns that begin behind the sensor, and their (N, 4) points."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     phase = np.linspace(0, 2 * np.pi * n, N * n, endpoint=False)
     bearing = np.pi - way * phase
     range_m = rng.uniform(3, 30, len(phase))

@@ -31,7 +31,7 @@ NO_ACCELERATION = f"{8 * (6 + 36)}x"
 """Field of a geometry_msgs/AccelWithCovariance of zeros."""
 
 
-def detections(result: FrameResult, frame_id: str, background: bool = False) -> bytes:
+def detections(result: FrameResult, frame_id: str, background: bool) -> bytes:
     """vision_msgs/Detection3DArray (version 4): whole boxes and posteriors, the reported class first."""
     objects = published_objects(result, background)
     header, header_values = header_fields(result.frame.stamp_s, frame_id)
@@ -62,7 +62,7 @@ def _detection(
     return (*header, "I", *results, "7d", "3d"), [(k, values) for k, (_, values) in names]
 
 
-def tracked_objects(result: FrameResult, frame_id: str, background: bool = False) -> bytes:
+def tracked_objects(result: FrameResult, frame_id: str, background: bool) -> bytes:
     """autoware_perception_msgs/TrackedObjects: whole boxes with their velocities, along and across each box."""
     objects = published_objects(result, background)
     R_level_sensor = result.frame.R_level_sensor
@@ -99,7 +99,7 @@ def tracked_objects(result: FrameResult, frame_id: str, background: bool = False
     return cdr.message()
 
 
-def obstacles(result: FrameResult, frame_id: str, background: bool = False) -> bytes:
+def obstacles(result: FrameResult, frame_id: str, background: bool) -> bytes:
     """nav2_dynamic_msgs/ObstacleArray: centres, velocities over ground, and sizes along the axes of the frame."""
     objects = published_objects(result, background)
     R_level_sensor = result.frame.R_level_sensor

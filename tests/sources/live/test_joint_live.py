@@ -3,7 +3,6 @@
 import socket
 import time
 from itertools import islice
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,8 +10,9 @@ import pytest
 from modt.schemes import open_sensor
 from modt.sources.live.joint_live import WAITED_PERIODS, JointLive
 from modt.sources.live.live_stream import LiveStream
-from modt.sources.stream import Reception, StreamEndedError, StreamInfo, Sweep
+from modt.sources.stream import StreamEndedError, StreamInfo, Sweep
 from tests.robots import CORNERS, mounted
+from tests.sources.live.readers import scripted
 from tests.sources.packets.simulated import packets
 from tools.send.loops import endless
 
@@ -30,8 +30,7 @@ class Robot:
         self.source = JointLive(CORNERS, self.streams, clock=self.clock, wait=self.wait)
 
     def _stream(self):
-        reader = SimpleNamespace(profile=None, reception=Reception(), read=lambda _: [], close=lambda: None)
-        return LiveStream(StreamInfo("sensor", "test", period_s=PERIOD_S), reader, clock=self.clock)
+        return LiveStream(StreamInfo("sensor", "test", period_s=PERIOD_S), scripted(), clock=self.clock)
 
     def clock(self):
         return self.now_s

@@ -1,28 +1,15 @@
 """The newest sweep is handed over; everything else is counted."""
 
 import logging
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from modt.sources.live.live_stream import LiveStream
-from modt.sources.stream import Reception, StreamEndedError, StreamInfo, Sweep
+from modt.sources.stream import StreamEndedError, StreamInfo, Sweep
+from tests.sources.live.readers import scripted
 
 INFO = StreamInfo("sensor", "test")
-
-
-def scripted(*batches):
-    """A reader that hands over batches of sweeps, one a call, and raises those that are errors."""
-    waiting = list(batches)
-
-    def read(timeout_s):
-        batch = waiting.pop(0) if waiting else []
-        if isinstance(batch, Exception):
-            raise batch
-        return batch
-
-    return SimpleNamespace(profile=None, reception=Reception(), read=read, close=lambda: None)
 
 
 def sweep(stamp_s, *, complete=True, x=5.0):

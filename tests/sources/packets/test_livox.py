@@ -84,8 +84,8 @@ def old_packet(at_s, kind, body, form=0):
     return bytes((5, 0, 1, 0, 0, 0, 0, 0, form, kind)) + stamp + body
 
 
-def echo(tag=0, bright=51):
-    return struct.pack("<iiiBB", *MM, bright, tag)
+def echo(tag=0):
+    return struct.pack("<iiiBB", *MM, 51, tag)
 
 
 @pytest.mark.parametrize("form", [0, 3])
