@@ -177,21 +177,17 @@ class Stages:
             Exception: the comparison failed. The present profile stays in use.
         """
         watch = self.trust.watch
+        runs = self.comparison is not None and self.comparison.is_alive()
         unsettled = self._failure is not None or self.chosen is not self._began_with[1]
         wanted = watch.compare_profiles or (unsettled and frame.time_s - self._compared_s >= RECOMPARED_S)
         if self._found_by_thread:
             with self._remembering_failure():
                 self._follow(self._found_by_thread.pop())
-        elif wanted and not watch.displaced and self._live and not self._thread_runs:
+        elif wanted and not watch.displaced and self._live and not runs:
             watch.compare_profiles = False
             self._compared_s = frame.time_s
             self.comparison = Thread(target=self._compare, args=(frame,), name="recognition", daemon=True)
             self.comparison.start()
-
-    @property
-    def _thread_runs(self) -> bool:
-        """Whether the thread that compares profiles runs."""
-        return self.comparison is not None and self.comparison.is_alive()
 
     def recover(self, *, anew: bool) -> None:
         """Restore the tracks of the last good frame; with `anew` make new stages without tracks.

@@ -233,10 +233,7 @@ class BagStream:
         for flaw in self._bag.flaws:
             self.faults.leave_out(self.reading.messages, self.info.name, flaw)
         for topic, number in self._bag.missing.items():
-            if number:
-                self.faults.leave_out(
-                    self.reading.messages, self.info.name, f"messages of {topic} are missing", number
-                )
+            self.faults.leave_out(self.reading.messages, self.info.name, f"messages of {topic} are missing", number)
 
     def _cloud(self, index: int, message: BagMessage) -> PointCloud | None:
         """The points of a message; None if it cannot be read."""

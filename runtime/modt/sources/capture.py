@@ -152,17 +152,18 @@ def _sends_points(capture: PcapFile, flow: tuple[str, int]) -> bool:
 def _notes_of_others(capture: PcapFile, flow: tuple[str, int]) -> list[str]:
     """A line for each other sensor among the first packets of a capture."""
     drivers = all_drivers()
-    others = Counter[tuple[str, int, str]]()
+    makers: dict[tuple[str, int], str] = {}
     for datagram in islice(capture, SEARCHED):
-        if (datagram.source, datagram.port) != flow:
-            maker = next((driver.maker for driver in drivers if driver.recognises(datagram.payload)), None)
-            if maker is not None:
-                others[datagram.source, datagram.port, maker] += 1
-    there = [
-        f"another {maker} at {source}, port {port}: --capture host={source} --capture port={port} reads it"
-        for source, port, maker in others
+        other = (datagram.source, datagram.port)
+        if other != flow and other not in makers:
+            driver = next((driver for driver in drivers if driver.recognises(datagram.payload)), None)
+            if driver is not None:
+                makers[other] = driver.maker
+    read = f"the packets of {flow[0]}, port {flow[1]}, are read"
+    return [
+        f"{read}; another {maker} at {source}, port {port}: --capture host={source} --capture port={port} reads it"
+        for (source, port), maker in makers.items()
     ]
-    return [f"the packets of {flow[0]}, port {flow[1]}, are read; {line}" for line in there]
 
 
 def _driver_of(capture: PcapFile, options: Mapping[str, str]) -> Driver:
