@@ -47,13 +47,13 @@ class Listing:
         topics: name, type and encoding of each topic by its number.
         messages: time [ns], number, and number of the topic of each message, ordered.
         dropped: number of rows that are no messages.
-        pages: the pages of a database that SQLite cannot read; None if it can.
+        damaged: SQLite cannot read the database, so that its pages are read one by one.
     """
 
     topics: dict[int, tuple[str, str, str]]
     messages: list[tuple[int, int, int]]
     dropped: int
-    pages: Pages | None = None
+    damaged: bool
 
 
 class DatabaseFile(BagFile):
@@ -79,19 +79,19 @@ class DatabaseFile(BagFile):
     def _messages(self, topics: Collection[str]) -> Iterator[Stored]:
         listing = self._listing
         names = {number: name for number, (name, _, _) in listing.topics.items() if name in topics}
-        if listing.pages is not None:
+        if listing.damaged:
             self.flaws.append("damaged: its pages are read one by one")
         if listing.dropped:
             self.flaws.append(f"{listing.dropped} of its rows are no messages")
         with closing(self._database()) as database:
             for recorded_ns, number, topic in listing.messages:
                 if topic in names:
-                    data = self._data(database, listing.pages, number)
+                    data = self._data(database, number)
                     yield Stored(names[topic], recorded_ns, data or b"", DAMAGED if data is None else "")
 
-    def _data(self, database: sqlite3.Connection, pages: Pages | None, number: int) -> bytes | None:
+    def _data(self, database: sqlite3.Connection, number: int) -> bytes | None:
         """Bytes of a message, None if they cannot be read."""
-        if pages is None:
+        if not self._listing.damaged:
             with suppress(sqlite3.Error):
                 for (data,) in self._run(database, "SELECT data FROM messages WHERE id = ?", number):
                     return data if isinstance(data, bytes) else None
@@ -104,13 +104,13 @@ class DatabaseFile(BagFile):
     @cached_property
     def _listing(self) -> Listing:
         """Topics and messages by the tables, or by the pages where the tables are damaged."""
-        pages = None
+        damaged = False
         try:
             topics, messages = self._tables()
         except sqlite3.Error as error:
-            pages = self._pages
-            topics = pages.topics
-            messages = pages.messages
+            damaged = True
+            topics = self._pages.topics
+            messages = self._pages.messages
             if not messages:
                 raise ModtError(self.path, f"cannot be read ({error})", REMEDY) from None
         known = {number: (name, kind, form) for number, name, kind, form in topics if _are(str, name, kind, form)}
@@ -119,7 +119,7 @@ class DatabaseFile(BagFile):
             if topic not in known and (kind := self._kind_of(number)):
                 known[topic] = (f"{PROVISIONAL}{topic}", kind, "cdr")
         rows = [row for _, row in sorted(listed.items()) if row[2] in known]
-        return Listing(known, _by_time(rows), len(messages) - len(rows), pages)
+        return Listing(known, _by_time(rows), len(messages) - len(rows), damaged)
 
     def _kind_of(self, number: int) -> str:
         """Type of a message whose topic is lost, by its content; empty if it is none that is read."""

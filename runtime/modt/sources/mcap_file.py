@@ -246,12 +246,12 @@ class McapFile(BagFile):
             raise ModtError(self.path, f"has a chunk of {piece.unpacked_bytes} bytes", REMEDY)
         self.spend(piece.unpacked_bytes)
         with self.plain.open("rb") as file:
-            file.seek(piece.crc_at if piece.unpacked_bytes else piece.at)
-            crc = int.from_bytes(file.read(4), "little") if piece.unpacked_bytes else 0
             file.seek(piece.at)
             packed = file.read(min(piece.size, MAX_RECORD_BYTES))
-        if not piece.unpacked_bytes:
-            return packed, len(packed) == piece.size
+            if not piece.unpacked_bytes:  # a message outside of a chunk
+                return packed, len(packed) == piece.size
+            file.seek(piece.crc_at)
+            crc = int.from_bytes(file.read(4), "little")
         data = unpacked(piece.compression, packed, piece.unpacked_bytes)
         whole = len(data) == piece.unpacked_bytes
         if whole and crc and zlib.crc32(data) != crc:

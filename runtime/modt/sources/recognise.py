@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from itertools import product
 from pathlib import Path
 from types import MappingProxyType
 
@@ -141,11 +142,11 @@ def _stream(path: Path, period_s: float) -> ScanStream | None:
         path = path.parent
     if _has_scans(path / "velodyne"):
         return kitti.odometry_sequence(path)
-    suffix = next((s for s in SUFFIXES if _has_scans(path, s)), None)
-    if suffix is None and (path / "truth.csv").is_file():
-        path /= "scans"
-        suffix = next((s for s in SUFFIXES if _has_scans(path, s)), None)
-    return None if suffix is None else kitti.scan_folder(path, period_s, suffix)
+    folders = (path, path / "scans") if (path / "truth.csv").is_file() else (path,)
+    for folder, suffix in product(folders, SUFFIXES):
+        if _has_scans(folder, suffix):
+            return kitti.scan_folder(folder, period_s, suffix)
+    return None
 
 
 def _is_bag(path: Path) -> bool:

@@ -51,12 +51,14 @@ SEARCHED_BYTES = 1 << 22
 """Bytes behind a damage in which the next record is searched."""
 
 
-def _flaw(numbers: tuple[int, ...] | None, at: int, found: int | None, *, sound: bool) -> str:
-    """Flaw of the record at an offset, after which one was found or none."""
-    if found is None and (numbers is None or sound):
-        return "truncated within the header of a record" if numbers is None else "truncated within a record"
-    absurd = numbers is not None and numbers[2] > MAX_RECORD_BYTES
-    cause = f"a record promises {numbers[2]} bytes" if numbers is not None and absurd else "damaged"
+def _flaw(numbers: tuple[int, ...], at: int, found: int | None, *, sound: bool) -> str:
+    """Flaw of the record at an offset, after which one was found or none; `numbers` are () for a part of a header."""
+    if found is None and not numbers:
+        return "truncated within the header of a record"
+    if found is None and sound:
+        return "truncated within a record"
+    absurd = bool(numbers) and numbers[2] > MAX_RECORD_BYTES
+    cause = f"a record promises {numbers[2]} bytes" if absurd else "damaged"
     return f"{cause} at byte {at}" if found else f"{cause} from byte {at} on"
 
 
@@ -151,10 +153,10 @@ class PcapFile:
             head = file.read(header.size)
             if not head:
                 return
-            numbers = header.unpack(head) if len(head) == header.size else None
-            sound = numbers is not None and self._is_header(numbers, second)
-            frame = file.read(numbers[2]) if numbers is not None and sound else b""
-            if numbers is not None and sound and len(frame) == numbers[2]:
+            numbers = header.unpack(head) if len(head) == header.size else ()
+            sound = bool(numbers) and self._is_header(numbers, second)
+            frame = file.read(numbers[2]) if sound else b""
+            if sound and len(frame) == numbers[2]:
                 second = numbers[0]
                 yield second + numbers[1] * self._unit_s, frame
                 before = at
