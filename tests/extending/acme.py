@@ -11,10 +11,6 @@ from modt.sources.stream import Sweep
 MAGIC = b"ACME"
 
 
-def is_packet(payload: bytes) -> bool:
-    return payload.startswith(MAGIC) and not (len(payload) - len(MAGIC)) % 16
-
-
 class AcmeDecoder(PacketDecoder):
     """A packet is a whole sweep: float32 rows of x, y, z and reflectance, on a scale that an option states."""
 
@@ -22,11 +18,12 @@ class AcmeDecoder(PacketDecoder):
         super().__init__(name)
         self._scale = np.float32(scale)
 
-    def accepts(self, payload: bytes) -> bool:
-        return is_packet(payload)
+    @staticmethod
+    def accepts(payload: bytes) -> bool:
+        return payload.startswith(MAGIC) and not (len(payload) - len(MAGIC)) % 16
 
     def decode(self, received_s: float, payload: bytes) -> Sequence[Sweep]:
-        if not is_packet(payload):
+        if not self.accepts(payload):
             self.refuse("no packet of an Acme")
             return []
         points = np.frombuffer(payload, np.float32, offset=len(MAGIC)).reshape(-1, 4).copy()
@@ -40,7 +37,7 @@ class AcmeDecoder(PacketDecoder):
 DRIVER = Driver(
     maker="Acme",
     port=4711,
-    recognises=is_packet,
+    recognises=AcmeDecoder.accepts,
     decoder=lambda name, options, _host: AcmeDecoder(name, float(options.get("scale", 1.0))),
     options={"scale": "NUMBER"},
 )
