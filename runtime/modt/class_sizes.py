@@ -68,8 +68,9 @@ STRIP_PERSON = PersonSize(0.9, min_height_m=0.7, min_top_m=1.1)
 HIDDEN_PERSON = PersonSize(0.75, min_height_m=0.2, min_top_m=1.35, max_top_m=2.2)
 """Bounds for head and shoulders behind something that hides the rest, as a counter does. What is wider may be the
 roof of a car behind its bonnet."""
-RAISED_PERSON = PersonSize(1.0, min_height_m=0.9, min_top_m=2.0, min_extent_m=0.3)
-"""Bounds for a person on a platform, whose top is higher above the ground that is seen than people are tall."""
+RAISED_PERSON = PersonSize(1.0, min_height_m=0.9, min_top_m=2.0, max_top_m=2.45, min_extent_m=0.3)
+"""Bounds for a person on a platform, whose top is higher above the ground that is seen than people are tall. Parts of
+trees and signs are higher."""
 PART_PERSON = PersonSize(MAX_PERSON_M, min_height_m=1.0)
 """Bounds for a proposal that is not merged into background, from a child of five on."""
 
