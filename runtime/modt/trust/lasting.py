@@ -139,10 +139,14 @@ class SectorHistory:
         self._last = count[0]
         blocked = self._dark_since_s <= now_s - tuning.dark_s
         if now_s - self._began_s >= tuning.window_s and not self._ever.all():
-            never = ~self._ever
-            by_design = _longest_run(never)[1] > tuning.most_bearings
-            blocked |= never & (not by_design)
+            blocked |= self._never_lit()
         self.blocked_deg = self._blocked(blocked, sample.raw) if blocked.any() else None
+
+    def _never_lit(self) -> Bool:
+        """(BEARINGS,) parts that never had a return, unless they are the sensor's design."""
+        never = ~self._ever
+        by_design = _longest_run(never)[1] > self._tuning.most_bearings
+        return never & (not by_design)
 
     def _covered(self, n_down: Float64, sample: Sample) -> Bool:
         """(BEARINGS,) parts of the widest sector that ended, however slowly, if a cover explains it.
