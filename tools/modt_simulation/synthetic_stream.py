@@ -47,22 +47,8 @@ SCENES = {
     scene.__name__: scene
     for scene in (
         *(street, crossing, yard, crowd, ramp, dock, hall, corridor, lobby, lift, warehouse, carpark),
-        *(
-            wall,
-            grass,
-            hedges,
-            vines,
-            scooters,
-            hills,
-            heaps,
-            stairs,
-            movers,
-            loading,
-            postures,
-            hidden,
-            platform,
-            clutter,
-        ),
+        *(wall, grass, hedges, vines, scooters, hills, heaps, stairs, clutter),
+        *(movers, loading, postures, hidden, platform),
     )
 }
 """Scene by name: the world by a random generator, a duration [s] and the height of the sensor [m]."""
