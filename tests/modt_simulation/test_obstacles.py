@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from modt.classes import ObjectClass
+from modt_simulation.covers import COVERS, PLATFORMS_M, hanging
 from modt_simulation.movers import MAKERS
-from modt_simulation.obstacles import COVERS, GAPS_M, PLATFORMS_M
+from modt_simulation.obstacles import GAPS_M
 from modt_simulation.postures import NEAR_M, RINGS_M, people
 from modt_simulation.synthetic_stream import SyntheticStream
 from tests.modt_simulation.test_stream import heights_of
@@ -128,6 +129,16 @@ def test_people_on_a_platform_are_as_high_as_it_is_said_to_be():
         heights_m.add(height_m)
     assert len(heights_m) > 3
     assert heights_m <= set(PLATFORMS_M)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_hangs_is_above_people_and_held_beside_them(seed):
+    for name, solids in hanging(np.random.default_rng(seed)).items():
+        reach_m = (np.abs(solids.rotation) @ solids.half[:, :, None])[:, :, 0]
+        above_person = (np.abs(solids.centre[:, :2]) - reach_m[:, :2]).max(axis=1) < 0.0
+        bottom_m = (solids.centre - reach_m)[:, 2]
+        assert above_person.any(), name
+        assert bottom_m[above_person].min() > 1.9
 
 
 def test_stairs_rise_ahead_and_fall_to_the_right():

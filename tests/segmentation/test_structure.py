@@ -132,8 +132,8 @@ def test_compiled_kernels_find_the_same_parts():
         columns = PointColumns.from_array(points.astype(np.float32))
         cells, _, sampled, _ = kernels.occupied_cells(clusterer.fine, columns, columns.z)
         beam_m = np.full(len(cells), 0.1, np.float32)
-        expected, sizes = NUMPY.cluster(clusterer, cells, sampled, beam_m)
-        cluster, compiled_sizes = kernels.cluster(clusterer, cells, sampled, beam_m)
+        expected, sizes, _ = NUMPY.cluster(clusterer, cells, sampled, beam_m)
+        cluster, compiled_sizes, _ = kernels.cluster(clusterer, cells, sampled, beam_m)
         assert_array_equal(cluster, expected)
         assert_array_equal(compiled_sizes.points, sizes.points)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.random import Generator
@@ -33,8 +32,6 @@ SHOULDER_M = 0.3
 """Half the breadth of a person."""
 BACK_M = 0.2
 """Half the depth of a person."""
-PLATFORMS_M = (0.15, 0.3, 0.45, 0.6, 0.9)
-"""Heights of platforms."""
 STEEPEST = 1.0
 """Tangent of the rays that may meet hills and stairs."""
 RISER_M, TREAD_M = 0.17, 0.3
@@ -45,30 +42,6 @@ SPEED_MPS = 0.4
 """Speed of the robot."""
 ROUGHNESS_M = {Material.PAVING: 0.01, Material.ASPHALT: 0.01, Material.GRASS: 0.03}
 """Standard deviation of the height of level ground."""
-
-
-class Cover(NamedTuple):
-    """What hides people up to the waist."""
-
-    depth_m: float
-    width_m: float
-    least_m: float  # height
-    greatest_m: float
-    material: Material
-    density: float = np.inf  # of foliage [1/m]
-
-    def solids(self, rng: Generator) -> Solids:
-        """One of a random height."""
-        size = self.depth_m, self.width_m, rng.uniform(self.least_m, self.greatest_m)
-        return block(size, self.material, density=self.density)
-
-
-COVERS = {
-    "counter": Cover(0.6, 2.5, 0.9, 1.15, Material.WOOD),
-    "crate": Cover(0.5, 1.0, 0.6, 1.1, Material.WOOD),
-    "hedge": Cover(0.6, 4.0, 0.7, 1.0, Material.FOLIAGE, 6.0),
-    "low wall": Cover(0.25, 4.0, 0.7, 1.1, Material.WALL),
-}
 
 
 def wall(rng: Generator, seconds: float, height_m: float) -> World:
@@ -88,7 +61,7 @@ def wall(rng: Generator, seconds: float, height_m: float) -> World:
     apart = rng.uniform(0.65, 0.9)
     for k in range(4):
         builder.pedestrian(Path.standing(-3.5 - k * apart, rng.normal(0.0, 0.1), 0.0), role="in a queue")
-    return _level(builder, Material.PAVING, height_m, TOUCHING_M)
+    return level_world(builder, Material.PAVING, height_m, TOUCHING_M)
 
 
 def _doorway(builder: SceneBuilder, x: float) -> None:
@@ -132,7 +105,7 @@ def grass(rng: Generator, seconds: float, height_m: float) -> World:
         if abs(y) > 1.0
     ]
     builder.scenery(Solids.join(tufts), 0.0, 0.0)
-    return _level(builder, Material.GRASS, height_m)
+    return level_world(builder, Material.GRASS, height_m)
 
 
 def hedges(rng: Generator, seconds: float, height_m: float) -> World:
@@ -145,7 +118,7 @@ def hedges(rng: Generator, seconds: float, height_m: float) -> World:
     for _ in range(14):
         y = rng.choice([-1, 1]) * rng.uniform(1.8, 9.0)
         builder.scenery(scenery.tree(rng), rng.uniform(-15.0, 15.0), y)
-    return _level(builder, Material.GRASS, height_m)
+    return level_world(builder, Material.GRASS, height_m)
 
 
 def heaps(rng: Generator, seconds: float, height_m: float) -> World:
@@ -158,7 +131,7 @@ def heaps(rng: Generator, seconds: float, height_m: float) -> World:
             (0.0, 0.0, 0.0), (wide, wide * rng.uniform(0.7, 1.2), rng.uniform(0.4, 1.6)), Material.ASPHALT
         )
         builder.scenery(heap, *_around(rng, 4.0, 18.0))
-    return _level(builder, Material.PAVING, height_m)
+    return level_world(builder, Material.PAVING, height_m)
 
 
 def hills(rng: Generator, seconds: float, height_m: float) -> World:
@@ -168,10 +141,10 @@ def hills(rng: Generator, seconds: float, height_m: float) -> World:
     tall = rng.uniform(0.4, 1.1)
     wave = 2 * np.pi / rng.uniform(15.0, 22.0)
     phase = rng.uniform(0, 2 * np.pi, 2)
-    ground = _uneven(
+    ground = uneven_ground(
         rng, lambda x, y: tall * np.sin(wave * x + phase[0]) * np.cos(wave * y + phase[1]), 0.25, 0.02, Material.GRASS
     )
-    return _world(builder, ground, height_m)
+    return world_on(builder, ground, height_m)
 
 
 def stairs(rng: Generator, seconds: float, height_m: float) -> World:
@@ -190,8 +163,8 @@ def stairs(rng: Generator, seconds: float, height_m: float) -> World:
     builder.bystander(foot + 0.75, rng.uniform(0.5, 2.0))
     builder.bystander(rng.uniform(1.0, 3.0), -edge - 3.5)
     builder.bystander(rng.uniform(-4.0, 0.0), 5.0)
-    ground = _uneven(rng, height, 0.1, 0.004, Material.PAVING)
-    return _world(builder, ground, height_m)
+    ground = uneven_ground(rng, height, 0.1, 0.004, Material.PAVING)
+    return world_on(builder, ground, height_m)
 
 
 def movers(rng: Generator, seconds: float, height_m: float) -> World:
@@ -205,7 +178,7 @@ def movers(rng: Generator, seconds: float, height_m: float) -> World:
     makers = (scenery.tree, scenery.pole, scenery.bin_, scenery.pallets)
     for k in range(16):
         builder.scenery(makers[k % 4](rng), *_around(rng, 12.0, 28.0))
-    return _level(builder, Material.ASPHALT, height_m, TOUCHING_M)
+    return level_world(builder, Material.ASPHALT, height_m, TOUCHING_M)
 
 
 def loading(rng: Generator, seconds: float, height_m: float) -> World:
@@ -226,7 +199,7 @@ def loading(rng: Generator, seconds: float, height_m: float) -> World:
     makers = (scenery.pallets, scenery.bin_, scenery.pole)
     for k in range(12):
         builder.scenery(makers[k % 3](rng), *_around(rng, 5.0, 28.0))
-    return _level(builder, Material.ASPHALT, height_m)
+    return level_world(builder, Material.ASPHALT, height_m)
 
 
 def _passing(builder: SceneBuilder, mover: Mover, name: str, distance_m: float, bearing_rad: float) -> None:
@@ -252,7 +225,7 @@ def vines(rng: Generator, seconds: float, height_m: float) -> World:
     for y in np.arange(-4.5, 5.0, 3.0):
         for x in np.arange(-15.0, 15.0, 1.2):
             builder.scenery(belongings.stake(rng), x, y + rng.normal(0.0, 0.1))
-    return _level(builder, Material.GRASS, height_m)
+    return level_world(builder, Material.GRASS, height_m)
 
 
 def scooters(rng: Generator, seconds: float, height_m: float) -> World:
@@ -262,7 +235,7 @@ def scooters(rng: Generator, seconds: float, height_m: float) -> World:
     for y in (-4.0, 4.0):
         for x in np.arange(-15.0, 15.0, rng.uniform(0.7, 0.95)):
             builder.parked_scooter(x, y + rng.normal(0.0, 0.15), rng.normal(np.pi / 2, 0.12))
-    return _level(builder, Material.ASPHALT, height_m, TOUCHING_M)
+    return level_world(builder, Material.ASPHALT, height_m, TOUCHING_M)
 
 
 def clutter(rng: Generator, seconds: float, height_m: float) -> World:
@@ -273,52 +246,7 @@ def clutter(rng: Generator, seconds: float, height_m: float) -> World:
         path = Path.standing(*_around(rng, 1.2, 5.0))
         builder.bodies.append(Body(kinds.OTHER, size, path, block(size, Material.WOOD), "low thing"))
     enclose(builder, (18.0, 18.0), 3.0)
-    return _level(builder, Material.PAVING, height_m)
-
-
-def hidden(rng: Generator, seconds: float, height_m: float) -> World:
-    """People who stand or walk behind what hides them up to the waist, in a walled yard."""
-    builder = SceneBuilder(rng, seconds)
-    first = rng.uniform(-np.pi, np.pi)
-    for slot, (name, cover) in enumerate(COVERS.items()):
-        bearing = first + slot * 2 * np.pi / len(COVERS)
-        along = np.array([np.cos(bearing), np.sin(bearing)])
-        across = np.array([-along[1], along[0]])
-        distance = rng.uniform(2.5, 9.0)
-        x, y = (distance * along).tolist()
-        builder.scenery(cover.solids(rng), x, y, bearing)
-        middle = (distance + cover.depth_m / 2 + rng.uniform(0.35, 1.2)) * along
-        speed = rng.uniform(0.5, 1.4) * rng.integers(2)
-        way = rng.choice((-0.5, 0.5)) * speed * seconds * across
-        role = f"behind a {name}"
-        if speed:
-            builder.walker([middle - way, middle + way], speed, role=role)
-        else:
-            x, y = middle.tolist()
-            builder.pedestrian(Path.standing(x, y, rng.uniform(-np.pi, np.pi)), role=role)
-    enclose(builder, (18.0, 18.0), 3.0)
-    return _level(builder, Material.PAVING, height_m, 0.0)
-
-
-def platform(rng: Generator, seconds: float, height_m: float) -> World:
-    """People who stand and walk on a platform along the way, which is as high as a pavement, a stage or a dock."""
-    builder = SceneBuilder(rng, seconds)
-    platform_m = float(rng.choice(PLATFORMS_M))
-    edge = rng.uniform(2.0, 4.0)
-    builder.scenery(block((50.0, 0.3, 3.0 + platform_m), Material.WALL), 0.0, edge + rng.uniform(4.5, 8.5))
-    for x in np.arange(-12.0, 13.0, 3.0) + rng.uniform(-1.0, 1.0, 9):
-        y = edge + rng.uniform(0.4, 3.5)
-        role = f"on a platform of {platform_m:g} m"
-        if rng.random() < 0.5:
-            builder.pedestrian(Path.standing(x, y, rng.uniform(-np.pi, np.pi)), role=role)
-        else:
-            builder.walker([(x, y), (x + rng.choice((-REACH_M, REACH_M)), y)], rng.uniform(0.6, 1.4), role=role)
-
-    def height(x: Float64, y: Float64) -> Float64:
-        level: Float64 = np.where(y > edge, platform_m, 0.0) + np.zeros_like(x)
-        return level
-
-    return _world(builder, _uneven(rng, height, 0.1, 0.006, Material.PAVING), height_m)
+    return level_world(builder, Material.PAVING, height_m)
 
 
 def _around(rng: Generator, nearest_m: float, farthest_m: float) -> tuple[float, float, float]:
@@ -328,20 +256,20 @@ def _around(rng: Generator, nearest_m: float, farthest_m: float) -> tuple[float,
     return distance * np.cos(bearing), distance * np.sin(bearing), rng.uniform(-np.pi, np.pi)
 
 
-def _level(builder: SceneBuilder, material: Material, height_m: float, margin_m: float = MARGIN_M) -> World:
+def level_world(builder: SceneBuilder, material: Material, height_m: float, margin_m: float = MARGIN_M) -> World:
     """World of level ground, rough by its material."""
     ground = floor(builder.rng, HALF_M, material, ROUGHNESS_M[material])
-    return _world(builder, ground, height_m, margin_m)
+    return world_on(builder, ground, height_m, margin_m)
 
 
-def _world(builder: SceneBuilder, ground: Terrain, height_m: float, margin_m: float = MARGIN_M) -> World:
+def world_on(builder: SceneBuilder, ground: Terrain, height_m: float, margin_m: float = MARGIN_M) -> World:
     """World in which the robot drives slowly and passes the origin at half time."""
     start = REACH_M - SPEED_MPS * builder.seconds / 2
     ego = Path.steady([(-REACH_M, 0.0), (REACH_M, 0.0)], start, SPEED_MPS, builder.seconds)
     return builder.world(ground, ego, height_m, ego_m=ROBOT_M, margin_m=margin_m)
 
 
-def _uneven(
+def uneven_ground(
     rng: Generator,
     height: Callable[[Float64, Float64], Float64],
     cell_m: float,

@@ -13,6 +13,7 @@ from modt.errors import MisuseError
 from modt.geometry import Camera
 from modt.sources.stream import Faults, Reading, StreamInfo
 from modt.types import DESKEWED, Frame, Self
+from modt_simulation.covers import hidden, overhangs, platform
 from modt_simulation.faults import read_faults
 from modt_simulation.gait import Gait
 from modt_simulation.indoors import carpark, corridor, hall, lift, lobby, warehouse
@@ -21,11 +22,9 @@ from modt_simulation.obstacles import (
     grass,
     heaps,
     hedges,
-    hidden,
     hills,
     loading,
     movers,
-    platform,
     scooters,
     stairs,
     vines,
@@ -48,7 +47,7 @@ SCENES = {
     for scene in (
         *(street, crossing, yard, crowd, ramp, dock, hall, corridor, lobby, lift, warehouse, carpark),
         *(wall, grass, hedges, vines, scooters, hills, heaps, stairs, clutter),
-        *(movers, loading, postures, hidden, platform),
+        *(movers, loading, postures, hidden, platform, overhangs),
     )
 }
 """Scene by name: the world by a random generator, a duration [s] and the height of the sensor [m]."""

@@ -47,7 +47,7 @@ from tools.study.drives import add_options, steps_of
 from tools.study.mounts import of_mount
 
 PLACES = (
-    *("postures", "hidden", "platform", "wall", "carpark", "grass", "hedges", "vines", "scooters"),
+    *("postures", "hidden", "platform", "overhangs", "wall", "carpark", "grass", "hedges", "vines", "scooters"),
     *("hills", "heaps", "stairs", "movers", "clutter"),
 )
 SMALL_M = 0.5

@@ -2,10 +2,12 @@
 #include "kernels.h"
 
 #define FAR_M 1e6f /* of grids.py */
+enum { LEVELS_PER_M = 10, N_LEVELS = 31 }; /* of overhang.py */
 
 /* Cells of cells.py: n occupied cells of a square grid. */
 typedef struct {
     i32 *row, *column SHAPE(n);
+    i32 *levels SHAPE(n);       /* levels of height with a point, a bit each */
     float *low, *high SHAPE(n); /* least and greatest height of the points above ground [m] */
     i64 *entries SHAPE(n);      /* points in each */
 } Cells;
@@ -67,6 +69,7 @@ EXPORT i64 modt_occupied_cells(const PointColumns *points, const float *height, 
         cells->low[c] = height[last];
         cells->high[c] = height[last];
         cells->entries[c] = 0;
+        cells->levels[c] = 0;
         table[cell[last]] = c;
     }
     /* 3. Every point looks up the number of its cell, and extends it. */
@@ -76,6 +79,7 @@ EXPORT i64 modt_occupied_cells(const PointColumns *points, const float *height, 
         float here = height[i];
         low[c] = minf(here, low[c]);
         high[c] = maxf(here, high[c]);
+        cells->levels[c] |= 1 << (i32)minf(maxf(here * (float)LEVELS_PER_M, 0.0f), N_LEVELS - 1);
         cells->entries[c]++;
     }
     for (i32 c = 0; c < count; c++) {
@@ -447,6 +451,9 @@ typedef struct {
     float *before_m;                /* (n,) distance of a free cell before surfaces, infinite where none reaches */
     float *surface_top_m;           /* (n,) greatest height of the surfaces of its cluster, infinite without any */
     float *front_m, *back_m;        /* (n,) greatest and least of those of each part */
+    float *top_m;                   /* (n,) height up to which a cell stands */
+    i32 *of_block;                  /* (side * side,) levels of each block of cells */
+    i32 *n_cells, *n_below;         /* (n,) cells of each part, and those below a gap */
     SurfaceScratch surface;
 } ClusterScratch;
 
@@ -484,6 +491,10 @@ static i64 place_scratch(i64 n, i32 side, void *memory, ClusterScratch *s)
     TAKE(&end, s->surface_top_m, n);
     TAKE(&end, s->front_m, n);
     TAKE(&end, s->back_m, n);
+    TAKE(&end, s->top_m, n);
+    TAKE(&end, s->of_block, side * side);
+    TAKE(&end, s->n_cells, n);
+    TAKE(&end, s->n_below, n);
     place_surface_scratch(n, &end, &s->surface);
     return (i64)(end - (uintptr_t)memory);
 }
@@ -849,12 +860,85 @@ static void find_leaving(const ClusterRules *rules, const StructureRules *struct
     }
 }
 
+/* OverhangTuning: values by the names that they have there. */
+typedef struct {
+    float max_range_m, min_top_m, gap_m, gap_beams, max_gap_m, min_share, max_person_m;
+    i32 block_cells, first_level, last_level;
+    i64 min_points;
+} OverhangRules;
+
+/* standing_top_m of overhang.py for a cell, given the levels of its block. */
+static float standing_top_m(const OverhangRules *rules, i32 around, i32 levels, float high, float beam_m)
+{
+    float gap_m = maxf(rules->gap_m, rules->gap_beams * beam_m);
+    i32 n_empty = (i32)mind(__builtin_ceilf(gap_m * (float)LEVELS_PER_M), N_LEVELS);
+    if (!((i64)around >> (rules->first_level + n_empty)))
+        return high; /* the levels end below the first gap */
+    for (i32 level = rules->first_level; level <= rules->last_level; level++) {
+        i64 from_here = (i64)around >> level;
+        if (from_here & (((i64)1 << n_empty) - 1) || !(from_here >> n_empty))
+            continue;
+        unsigned standing = (unsigned)levels & ((1u << level) - 1);
+        return standing ? (float)(32 - __builtin_clz(standing)) * (1.0f / LEVELS_PER_M) : 0.0f;
+    }
+    return high;
+}
+
+/* CellClusterer._may_stand_below: uses the cells that stand in clusters that may hold a person and what hangs above,
+ * and sets their `top_m`. Returns how many they are. */
+static i64 find_standing_cells(const ClusterRules *rules, const StructureRules *structure,
+                               const OverhangRules *overhang, const Cells *cells, const float *beam_m, i64 n_cells,
+                               const i64 *cluster, const ClusterSizes *sizes, const ClusterScratch *s)
+{
+    const i32 side = rules->fine_side, block = overhang->block_cells, blocks = side / block + 1;
+    i64 n_used = 0;
+    for (i64 k = 0; k < blocks * blocks; k++)
+        s->of_block[k] = 0;
+    for (i64 i = 0; i < n_cells; i++)
+        s->of_block[cells->row[i] / block * blocks + cells->column[i] / block] |= cells->levels[i];
+    for (i64 i = 0; i < n_cells; i++) {
+        i64 g = cluster[i];
+        int tried = sizes->extent_m[g] > rules->min_extent_m && sizes->points[g] >= 2 * rules->min_points &&
+                    sizes->top_m[g] > overhang->min_top_m &&
+                    sizes->sqrt_range[g] * sizes->sqrt_range[g] < overhang->max_range_m;
+        if (!tried || cells->low[i] > structure->hanging_m || overhang->gap_beams * beam_m[i] > overhang->max_gap_m)
+            continue;
+        i32 around = s->of_block[cells->row[i] / block * blocks + cells->column[i] / block];
+        s->top_m[i] = standing_top_m(overhang, around, cells->levels[i], cells->high[i], beam_m[i]);
+        s->used[n_used] = (i32)i; /* overwritten by the next, unless it stands */
+        n_used += s->top_m[i] > 0;
+    }
+    return n_used;
+}
+
+/* CellClusterer._leaves_overhang: sets `cluster_of_part` of those that leave, which are numbered from n on. */
+static void find_leaving_overhang(const ClusterRules *rules, const StructureRules *structure, const PersonSize *person,
+                                  const OverhangRules *overhang, const Cells *cells, i64 n_used, i64 n,
+                                  const ClusterSizes *parts, i64 n_parts, const ClusterScratch *s)
+{
+    for (i64 p = 0; p < n_parts; p++) {
+        s->n_cells[p] = 0;
+        s->n_below[p] = 0;
+    }
+    for (i64 k = 0; k < n_used; k++) {
+        s->n_cells[s->part[k]]++;
+        s->n_below[s->part[k]] += s->top_m[s->used[k]] < cells->high[s->used[k]];
+    }
+    for (i64 p = 0; p < n_parts; p++) {
+        int leaves = may_be_person_part(rules, person, parts, p) && parts->points[p] >= overhang->min_points &&
+                     parts->top_m[p] < overhang->max_person_m && parts->bottom_m[p] < structure->max_bottom_m &&
+                     s->n_below[p] >= overhang->min_share * s->n_cells[p];
+        s->cluster_of_part[p] = leaves ? (i32)(n + p) : NONE;
+    }
+}
+
 /* CellClusterer.cluster: cluster of each cell, given one point of each and the distance of beams there. Returns
- * how many clusters there are: those of the coarse grid, the parts tried, and the parts tried before surfaces. There
- * is room for the sizes of 3 n_cells. */
+ * how many clusters there are: those of the coarse grid, and the parts tried in each step. There is room for the
+ * sizes of 4 n_cells. */
 EXPORT i64 modt_cluster(const ClusterRules *rules, const StructureRules *structure, const PersonSize *person,
-                        const PersonSize *hidden_person, const Cells *cells, const PointColumns *sampled,
-                        const float *beam_m, i64 n_cells, void *memory, i64 *cluster, const ClusterSizes *sizes)
+                        const PersonSize *hidden_person, const OverhangRules *overhang, const Cells *cells,
+                        const PointColumns *sampled, const float *beam_m, i64 n_cells, void *memory, i64 *cluster,
+                        const ClusterSizes *sizes, float *below_m, i64 *hanging)
 {
     ClusterScratch scratch, *s = &scratch;
     PROVEN(rules->coarse_side <= rules->fine_side);
@@ -890,12 +974,32 @@ EXPORT i64 modt_cluster(const ClusterRules *rules, const StructureRules *structu
 
     /* 3. Parts before surfaces, and people behind them. */
     n_used = find_free_cells(rules, structure, person, cells, sampled, n_cells, cluster, sizes, n, s);
-    if (!n_used)
-        return n;
     n_parts = connect(cells, n_used, 0, rules->fine_side, s, s->part);
     parts = sizes_from(sizes, n);
     measure(cells, sampled, beam_m, s->part, n_used, n_parts, s, &parts);
     find_leaving(rules, structure, person, hidden_person, n_used, cluster, sizes, n, &parts, n_parts, s);
+    move_parts(cells, s, n_used, n_parts, cluster, sizes, &parts);
+    n += n_parts;
+
+    /* 4. Who stands below something that hangs leaves it. */
+    for (i64 i = 0; i < n_cells; i++) {
+        below_m[i] = INFINITY;
+        hanging[i] = NONE;
+    }
+    n_used = find_standing_cells(rules, structure, overhang, cells, beam_m, n_cells, cluster, sizes, s);
+    Cells standing = *cells;
+    standing.high = s->top_m;
+    n_parts = connect(&standing, n_used, 0, rules->fine_side, s, s->part);
+    parts = sizes_from(sizes, n);
+    measure(&standing, sampled, beam_m, s->part, n_used, n_parts, s, &parts);
+    find_leaving_overhang(rules, structure, person, overhang, cells, n_used, n, &parts, n_parts, s);
+    for (i64 k = 0; k < n_used; k++) {
+        i32 i = s->used[k];
+        if (s->cluster_of_part[s->part[k]] == NONE || !(s->top_m[i] < cells->high[i]))
+            continue;
+        below_m[i] = s->top_m[i];
+        hanging[i] = cluster[i];
+    }
     move_parts(cells, s, n_used, n_parts, cluster, sizes, &parts);
     return n + n_parts;
 }

@@ -14,8 +14,9 @@ from modt.class_sizes import PersonSize
 from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.grids import FAR_M, Int32, PointColumns, SqrtRangeGrid
 from modt.segmentation.groups import Groups, consecutive, label_max, label_min
+from modt.segmentation.overhang import Overhangs, levels_of, standing_top_m
 from modt.segmentation.structure import find_surfaces
-from modt.segmentation.tuning import CellTuning, ClusterTuning, SplitTuning, StructureTuning
+from modt.segmentation.tuning import CellTuning, ClusterTuning, OverhangTuning, SplitTuning, StructureTuning
 from modt.types import NONE, Bool, Float32, Int, Int8, PointKind, Self
 
 
@@ -25,6 +26,7 @@ class Cells:
 
     row: Int32  # (C,) of the grid
     column: Int32  # (C,) of the grid
+    levels: Int32  # (C,) levels of height with a point, a bit each
     low: Float32  # (C,) least height of the points above ground [m]
     high: Float32  # (C,) greatest height of the points above ground [m]
     entries: Int  # (C,) points in each
@@ -37,17 +39,22 @@ def occupied_cells(
     grid: SqrtRangeGrid, points: PointColumns, height: Float32
 ) -> tuple[Cells, Int, PointColumns, Int]:
     """Cells of (K,) points with (K,) heights [m], (C,) last point of each, those points, (K,) cell of each."""
-    cells, sample, cell_of_point = _occupied(grid, *grid.row_column(points), height, height)
+    cells, sample, cell_of_point = _occupied(grid, *grid.row_column(points), levels_of(height), height, height)
     return cells, sample, points.take(sample), cell_of_point
 
 
-def _occupied(grid: SqrtRangeGrid, row: Int32, column: Int32, low: Float32, high: Float32) -> tuple[Cells, Int, Int]:
+def _occupied(
+    grid: SqrtRangeGrid, row: Int32, column: Int32, levels: Int32, low: Float32, high: Float32
+) -> tuple[Cells, Int, Int]:
     """Cells of (K,) entries, (C,) last entry of each, (K,) cell of each entry."""
     sample, cell = grid.occupied(grid.flat_index(row, column))
     n = len(sample)
+    levels_of_cell = np.zeros(n, np.int32)
+    np.bitwise_or.at(levels_of_cell, cell, levels)
     cells = Cells(
         row=row[sample],
         column=column[sample],
+        levels=levels_of_cell,
         low=label_min(low, cell, n),
         high=label_max(high, cell, n),
         entries=np.bincount(cell, minlength=n),
@@ -86,7 +93,9 @@ def connect_coarse(grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32) -> Int
 
     The gap of a wide cell is that of its last cell; wide cells are in the order of their last cells.
     """
-    wide, sample, wide_of_cell = _occupied(grid, cells.row >> 1, cells.column >> 1, cells.low, cells.high)
+    wide, sample, wide_of_cell = _occupied(
+        grid, cells.row >> 1, cells.column >> 1, cells.levels, cells.low, cells.high
+    )
     return connect(grid, wide, max_gap_m.take(sample), np.ones(len(wide), np.bool_)).take(wide_of_cell)
 
 
@@ -166,6 +175,15 @@ class AirOfCells:
         """No air in n cells."""
         return cls(np.ones(n, np.float32), np.ones(n, np.float32), np.zeros(n, np.bool_), 0, 0.0)
 
+    def followed_by(self, cells: Int) -> Self:
+        """The air of all cells, then that of some of them again."""
+        return replace(
+            self,
+            beam_m=np.concatenate([self.beam_m, self.beam_m[cells]]),
+            solidity=np.concatenate([self.solidity, self.solidity[cells]]),
+            airborne=np.concatenate([self.airborne, self.airborne[cells]]),
+        )
+
 
 @dataclass(frozen=True)
 class Clusters:
@@ -205,6 +223,7 @@ class CellClusterer:
         split: parts that are a person.
         structure: surfaces, and parts before them.
         kept: points and height of a part that stands out.
+        overhang: people below what hangs.
     """
 
     def __init__(
@@ -215,11 +234,13 @@ class CellClusterer:
         split: SplitTuning = SplitTuning(),
         structure: StructureTuning = StructureTuning(),
         kept: ClusterTuning = ClusterTuning(),
+        overhang: OverhangTuning = OverhangTuning(),
     ) -> None:
         self.gap = cells
         self.split = split
         self.structure = structure
         self.kept = kept
+        self.overhang = overhang
         self.max_extent_m = config.max_extent_m
         step = config.cell_m / np.sqrt(10.0)
         # Points are placed on the fine grid alone, and a coarse cell is two by two fine ones. So the centre of the
@@ -230,8 +251,8 @@ class CellClusterer:
         spacing = split.min_cell_returns * np.deg2rad(sensor.azimuth_step_deg)
         self.max_split_sqrt_range = np.float32(self.fine.step / spacing)
 
-    def cluster(self, cells: Cells, sampled: PointColumns, beam_m: Float32) -> tuple[Int, ClusterSizes]:
-        """(C,) cluster of each cell, given one point of each and the distance of beams there [m]; their sizes.
+    def cluster(self, cells: Cells, sampled: PointColumns, beam_m: Float32) -> tuple[Int, ClusterSizes, Overhangs]:
+        """(C,) cluster of each cell, given one point of each and the distance of beams there [m]; sizes; what hangs.
 
         Every cell is in a cluster. The parts that were tried come after the clusters of the coarse grid. A part that
         is not split off keeps its number, with no points. Of a cluster that parts leave, only `points` is corrected;
@@ -258,7 +279,46 @@ class CellClusterer:
         parts = ClusterSizes.of_cells(cells, sampled, beam_m, part)
         extent_m = sizes.extent_m.take(cluster.take(parts.cell))
         leaves = self._leaves_surface(parts, part, before_m, surface_top_m.take(parts.cell), extent_m)
-        return moved(cells, cluster, sizes, part, parts, leaves)
+        cluster, sizes = moved(cells, cluster, sizes, part, parts, leaves)
+
+        # 4. Who stands below something that hangs leaves it.
+        top_m = standing_top_m(cells.row, cells.column, cells.levels, cells.high, beam_m, self.overhang)
+        standing = replace(cells, high=top_m)
+        part = connect(self.fine, standing, max_gap_m, self._may_stand_below(cells, top_m, beam_m, cluster, sizes))
+        parts = ClusterSizes.of_cells(standing, sampled, beam_m, part)
+        below = (part != NONE) & (top_m < cells.high)
+        leaves = self._leaves_overhang(parts, part, below)
+        splits = np.flatnonzero(below)
+        splits = splits[leaves.take(part.take(splits))]
+        hanging = Overhangs(np.full(len(cells), np.inf, np.float32), np.full(len(cells), NONE))
+        hanging.below_m[splits] = top_m[splits]
+        hanging.cluster[splits] = cluster[splits]
+        return *moved(cells, cluster, sizes, part, parts, leaves), hanging
+
+    def _may_stand_below(
+        self, cells: Cells, top_m: Float32, beam_m: Float32, cluster: Int, sizes: ClusterSizes
+    ) -> Bool:
+        """(C,) cells that stand, up to (C,) top_m [m], in clusters that may hold a person and what hangs above."""
+        tuning = self.overhang
+        tried = (sizes.extent_m > self.split.min_extent_m) & (sizes.points >= 2 * self.split.min_points)
+        tried &= sizes.top_m > np.float32(tuning.min_top_m)
+        tried &= sizes.sqrt_range * sizes.sqrt_range < np.float32(tuning.max_range_m)
+        stands = (top_m > 0) & (cells.low <= np.float32(self.structure.hanging_m))
+        stands &= np.float32(tuning.gap_beams) * beam_m <= np.float32(tuning.max_gap_m)
+        may: Bool = tried.take(cluster) & stands
+        return may
+
+    def _leaves_overhang(self, parts: ClusterSizes, part: Int, below: Bool) -> Bool:
+        """(parts,) possible people, given (C,) the part of each cell or NONE, and if something hangs above it."""
+        tuning = self.overhang
+        n_cells = np.bincount(part[part != NONE], minlength=len(parts))
+        n_below = np.bincount(part[below], minlength=len(parts))
+        leaves = self._may_be_person(parts, self.split.person) & (parts.points >= tuning.min_points)
+        leaves &= (parts.top_m < np.float32(tuning.max_person_m)) & (
+            parts.bottom_m < np.float32(self.structure.max_bottom_m)
+        )
+        leaves &= n_below >= tuning.min_share * n_cells
+        return leaves
 
     def _before_surfaces(
         self, cells: Cells, sampled: PointColumns, cluster: Int, sizes: ClusterSizes
@@ -359,6 +419,53 @@ def moved(
     after[moving] = len(sizes) + part[moving]
     left = replace(sizes, points=sizes.points - gone)
     return after, left.followed_by(replace(parts, points=parts.points * leaves))
+
+
+def set_apart(
+    found: Clusters, cluster: Int, sizes: ClusterSizes, hanging: Overhangs
+) -> tuple[Clusters, Int, ClusterSizes]:
+    """The cells, (C,) cluster of each and sizes, after what hangs above people has got cells of its own."""
+    cells = np.flatnonzero(hanging.cluster != NONE)
+    if not len(cells):
+        return found, cluster, sizes
+    n = len(cells)
+    number = np.full(len(cluster), NONE)
+    number[cells] = np.arange(n)
+    is_hanging = found.height > hanging.below_m.take(found.cell_of_point)
+    point = np.flatnonzero(is_hanging & (number.take(found.cell_of_point) != NONE))
+    own = number.take(found.cell_of_point[point])
+    height = found.height[point]
+    entries = np.bincount(own, minlength=n)
+    points = sizes.points.copy()
+    np.add.at(points, cluster[cells], -entries)
+    np.add.at(points, hanging.cluster[cells], entries)
+    rest = found.cells
+    high = rest.high.copy()
+    high[cells] = hanging.below_m[cells]
+    remaining = rest.entries.copy()
+    remaining[cells] -= entries
+    cell_of_point = found.cell_of_point.copy()
+    cell_of_point[point] = len(rest) + own
+    last = np.zeros(n, np.int64)
+    np.maximum.at(last, own, point)
+    sample = np.concatenate([found.sample, last])
+    with_own = Cells(
+        row=np.concatenate([rest.row, rest.row[cells]]),
+        column=np.concatenate([rest.column, rest.column[cells]]),
+        levels=np.concatenate([rest.levels, rest.levels[cells]]),
+        low=np.concatenate([rest.low, label_min(height, own, n)]),
+        high=np.concatenate([high, label_max(height, own, n)]),
+        entries=np.concatenate([remaining, entries]),
+    )
+    apart = replace(
+        found,
+        cell_of_point=cell_of_point,
+        cells=with_own,
+        sample=sample,
+        sampled=found.points.take(sample),
+        air=found.air.followed_by(cells),
+    )
+    return apart, np.concatenate([cluster, hanging.cluster[cells]]), replace(sizes, points=points)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.segmentation.cells import CellClusterer, Cells, Clusters, ClusterSizes, moved
+from modt.segmentation.cells import CellClusterer, Cells, Clusters, ClusterSizes, moved, set_apart
 from modt.segmentation.gaps import NO_GAPS, unseen_m
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.groups import consecutive, label_max
@@ -46,7 +46,9 @@ class Clusterer:
         self.config = config
         self.beams = sensor.beams
         self.gaps = NO_GAPS  # of dead beams
-        self.cells = CellClusterer(sensor, config, tuning.cells, tuning.split, tuning.structure, tuning.clusters)
+        self.cells = CellClusterer(
+            sensor, config, tuning.cells, tuning.split, tuning.structure, tuning.clusters, tuning.overhang
+        )
         self.porosity = PorosityFinder(sensor, self.cells.fine, tuning.porosity)
         self.min_solidity = tuning.porosity.min_cluster_solidity
         self.kept = tuning.clusters
@@ -68,7 +70,8 @@ class Clusterer:
 
     def cluster(self, found: Clusters, kind_of_porous: PointKind = PointKind.SPARSE) -> Clusters:
         """These cells in clusters that can be objects; a cluster that most rays pass is of a kind."""
-        cluster, sizes = self.kernels.cluster(self.cells, found.cells, found.sampled, found.air.beam_m)
+        cluster, sizes, hanging = self.kernels.cluster(self.cells, found.cells, found.sampled, found.air.beam_m)
+        found, cluster, sizes = set_apart(found, cluster, sizes, hanging)
         cluster, sizes = self._people_split_off(cluster, sizes, found.cells, found.sampled, found.air.beam_m)
         found = replace(found, cluster_of_cell=cluster, n=len(sizes))
         # Strips are merged before clusters are judged, since a strip alone may be too low to be an object.

@@ -57,7 +57,7 @@ class LowFinder:
         height = above.height_m.take(places)
         cells, sample, sampled, cell_of_point = self.kernels.occupied_cells(self.clusterer.fine, points, height)
         no_beam_m = np.zeros(len(cells), np.float32)  # neighbours are connected whatever the gap (ANY_GAP)
-        group_of_cell, sizes = self.kernels.cluster(self.clusterer, cells, sampled, no_beam_m)
+        group_of_cell, sizes, _ = self.kernels.cluster(self.clusterer, cells, sampled, no_beam_m)
         standing_of_cell = self._standing_of_cell(beside.take(sample), group_of_cell, sizes)
         is_foot = standing_of_cell != NONE
         kind_of_group = self._kind(sizes)

@@ -19,6 +19,7 @@ from modt.segmentation.grids import FAR_M, SECTORS, PointColumns, SqrtRangeGrid
 from modt.segmentation.ground import QUARTERS, GroundEstimator
 from modt.segmentation.groups import AXES, BRIGHT, DARK, HEADINGS, Groups
 from modt.segmentation.kernels import Above, Bounds, Kernels
+from modt.segmentation.overhang import Overhangs
 from modt.segmentation.porosity import PorosityFinder
 from modt.segmentation.strips import DIRECTION, ViewBounds
 from modt.segmentation.tuning import HeadTuning, StripTuning
@@ -39,6 +40,7 @@ HEAD_TUNING = structure("HeadTuning")
 CLUSTER_SIZES = structure("ClusterSizes")
 VIEW_BOUNDS = structure("ViewBounds")
 STRIP_RULES = structure("StripRules")
+OVERHANG_RULES = structure("OverhangRules")
 CLUSTERS = structure("Clusters")
 MEMBERS = structure("Members")
 
@@ -132,10 +134,10 @@ class NativeKernels(NativeGeometryKernels, Kernels):
     ) -> tuple[Cells, Int, PointColumns, Int]:
         """Cells of (K,) points with (K,) heights [m], (C,) last point of each, those points, (K,) cell of each."""
         k = len(points)
-        row, column = np.empty((2, k), np.int32)
+        row, column, levels = np.empty((3, k), np.int32)
         low, high, *columns = np.empty((6, k), np.float32)
         entries, sample, cell_of_point = np.empty((3, k), np.int64)
-        cells = Cells(row, column, low, high, entries)
+        cells = Cells(row, column, levels, low, high, entries)
         sampled = PointColumns(*columns)
         n = self.library.modt_occupied_cells(
             POINT_COLUMNS.of(points),
@@ -224,20 +226,22 @@ class NativeKernels(NativeGeometryKernels, Kernels):
 
     def cluster(
         self, clusterer: CellClusterer, cells: Cells, sampled: PointColumns, beam_m: Float32
-    ) -> tuple[Int, ClusterSizes]:
-        """(C,) cluster of each cell, given one point of each and the distance of beams there [m]; their sizes."""
+    ) -> tuple[Int, ClusterSizes, Overhangs]:
+        """(C,) cluster of each cell, given a point of each and the distance of beams there [m]; sizes; what hangs."""
         n = len(cells)
         scratch = self._memory(self.library.modt_cluster_scratch(n, clusterer.fine.side))
-        cluster = np.empty(n, np.int64)
-        count, cell = np.empty((2, 3 * n), np.int64)
-        extent_m, bottom_m, top_m, sqrt_range, last_beam_m = np.empty((5, 3 * n), np.float32)
-        of_oversized = np.empty(3 * n, np.bool_)
+        cluster, hanging = np.empty((2, n), np.int64)
+        below_m = np.empty(n, np.float32)
+        count, cell = np.empty((2, 4 * n), np.int64)
+        extent_m, bottom_m, top_m, sqrt_range, last_beam_m = np.empty((5, 4 * n), np.float32)
+        of_oversized = np.empty(4 * n, np.bool_)
         sizes = ClusterSizes(count, cell, extent_m, bottom_m, top_m, sqrt_range, last_beam_m, of_oversized)
         g = self.library.modt_cluster(
             self._structure(_cluster_rules, clusterer),
             self._structure(_structure_rules, clusterer),
             self._structure(PERSON_SIZE.of, clusterer.split.person),
             self._structure(PERSON_SIZE.of, clusterer.split.hidden_person),
+            self._structure(OVERHANG_RULES.of, clusterer.overhang),
             CELLS.of(cells),
             POINT_COLUMNS.of(sampled),
             beam_m,
@@ -245,8 +249,10 @@ class NativeKernels(NativeGeometryKernels, Kernels):
             scratch,
             cluster,
             CLUSTER_SIZES.of(sizes),
+            below_m,
+            hanging,
         )
-        return cluster, _first(sizes, g)
+        return cluster, _first(sizes, g), Overhangs(below_m, hanging)
 
     def find_people(
         self, x: Float32, y: Float32, low: Float32, high: Float32, entries: Int, tuning: HeadTuning

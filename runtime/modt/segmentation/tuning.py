@@ -294,6 +294,34 @@ class StructureTuning:
 
 
 @dataclass(frozen=True)
+class OverhangTuning:
+    """People below something that hangs. Chosen on: posed crowns, awnings and lintels, with a check on streets."""
+
+    max_range_m: float = 15.0
+    """Range of a cluster up to which they are looked for [m]. More costs time."""
+    min_top_m: float = 1.95
+    """Least height of the top of the cluster [m]. Less costs time."""
+    block_cells: int = 3
+    """Side of a block of cells whose points show a gap. Fewer: by chance few points of a van leave one."""
+    gap_m: float = 0.2
+    """Least height of a gap [m]. More keeps people joined to what hangs right above them."""
+    gap_beams: float = 1.5
+    """The same in spacings of the beams. Less takes the spacing for a gap."""
+    max_gap_m: float = 0.6
+    """Gap from which on the beams are too far apart to show one [m]."""
+    first_level: int = 10
+    """Lowest level of height at which a gap begins: that of a child's head."""
+    last_level: int = 22
+    """Highest level of height at which a gap begins: that of a tall person's head."""
+    min_share: float = 0.2
+    """Least share of a person's cells below a gap. Less takes shrubs beside a crown for people."""
+    max_person_m: float = 2.0
+    """Greatest height of such a person [m]. More takes trunks for people."""
+    min_points: int = 20
+    """Points below which a part is no person. Less takes twigs for people."""
+
+
+@dataclass(frozen=True)
 class ClusterTuning:
     """Clusters that are kept although they are low, or parts of an oversized one."""
 
@@ -443,6 +471,7 @@ class SegmentationTuning:
     clusters: ClusterTuning = ClusterTuning()
     low: LowTuning = LowTuning()
     structure: StructureTuning = StructureTuning()
+    overhang: OverhangTuning = OverhangTuning()
     heads: HeadTuning = HeadTuning()
     strips: StripTuning = StripTuning()
     support: SupportTuning = SupportTuning()

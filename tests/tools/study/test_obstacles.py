@@ -47,7 +47,9 @@ def judged(group_of_body, reported=ObjectClass.PEDESTRIAN, cut=0):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("scene", "seed"), [("hidden", 901), ("platform", 902), ("platform", 905)])
+@pytest.mark.parametrize(
+    ("scene", "seed"), [("hidden", 901), ("platform", 902), ("platform", 905), ("overhangs", 941)]
+)
 def test_people_who_are_hidden_or_raised_are_recalled(scene, seed):
     drive = run(SyntheticStream(scene, "vlp-16", 1.0, seed, height_m=0.8), "accurate")
     seen = sum(role.seen for role in drive.roles.values())
