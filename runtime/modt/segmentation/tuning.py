@@ -297,8 +297,8 @@ class StructureTuning:
 class OverhangTuning:
     """People below something that hangs. Chosen on: posed crowns, awnings and lintels, with a check on streets."""
 
-    max_range_m: float = 15.0
-    """Range of a cluster up to which they are looked for [m]. More costs time."""
+    max_range_m: float = 10.0
+    """Range of a cluster up to which they are looked for [m]. More takes shrubs below trees for people."""
     min_top_m: float = 1.95
     """Least height of the top of the cluster [m]. Less costs time."""
     block_cells: int = 3
