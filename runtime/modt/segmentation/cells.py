@@ -282,17 +282,30 @@ class CellClusterer:
         cluster, sizes = moved(cells, cluster, sizes, part, parts, leaves)
 
         # 4. Who stands below something that hangs leaves it.
+        return self._people_below(cells, sampled, beam_m, max_gap_m, cluster, sizes)
+
+    def _people_below(
+        self,
+        cells: Cells,
+        sampled: PointColumns,
+        beam_m: Float32,
+        max_gap_m: Float32,
+        cluster: Int,
+        sizes: ClusterSizes,
+    ) -> tuple[Int, ClusterSizes, Overhangs]:
+        """(C,) cluster of each cell and sizes, after people have left what hangs above them, and what hangs.
+
+        Neighbours with a vertical gap below (C,) max_gap_m are connected.
+        """
         top_m = standing_top_m(cells.row, cells.column, cells.levels, cells.high, beam_m, self.overhang)
         standing = replace(cells, high=top_m)
         part = connect(self.fine, standing, max_gap_m, self._may_stand_below(cells, top_m, beam_m, cluster, sizes))
         parts = ClusterSizes.of_cells(standing, sampled, beam_m, part)
         below = (part != NONE) & (top_m < cells.high)
         leaves = self._leaves_overhang(parts, part, below)
-        splits = np.flatnonzero(below)
-        splits = splits[leaves.take(part.take(splits))]
-        hanging = Overhangs(np.full(len(cells), np.inf, np.float32), np.full(len(cells), NONE))
-        hanging.below_m[splits] = top_m[splits]
-        hanging.cluster[splits] = cluster[splits]
+        divided_cells = np.flatnonzero(below)
+        divided_cells = divided_cells[leaves.take(part.take(divided_cells))]
+        hanging = Overhangs.above(divided_cells, top_m, cluster)
         return *moved(cells, cluster, sizes, part, parts, leaves), hanging
 
     def _may_stand_below(
@@ -428,44 +441,55 @@ def set_apart(
     cells = np.flatnonzero(hanging.cluster != NONE)
     if not len(cells):
         return found, cluster, sizes
-    n = len(cells)
     number = np.full(len(cluster), NONE)
-    number[cells] = np.arange(n)
+    number[cells] = np.arange(len(cells))
     is_hanging = found.height > hanging.below_m.take(found.cell_of_point)
     point = np.flatnonzero(is_hanging & (number.take(found.cell_of_point) != NONE))
     own = number.take(found.cell_of_point[point])
-    height = found.height[point]
-    entries = np.bincount(own, minlength=n)
+    entries = np.bincount(own, minlength=len(cells))
     points = sizes.points.copy()
     np.add.at(points, cluster[cells], -entries)
     np.add.at(points, hanging.cluster[cells], entries)
-    rest = found.cells
-    high = rest.high.copy()
-    high[cells] = hanging.below_m[cells]
-    remaining = rest.entries.copy()
-    remaining[cells] -= entries
     cell_of_point = found.cell_of_point.copy()
-    cell_of_point[point] = len(rest) + own
-    last = np.zeros(n, np.int64)
+    cell_of_point[point] = len(cluster) + own
+    last = np.zeros(len(cells), np.int64)
     np.maximum.at(last, own, point)
     sample = np.concatenate([found.sample, last])
-    with_own = Cells(
-        row=np.concatenate([rest.row, rest.row[cells]]),
-        column=np.concatenate([rest.column, rest.column[cells]]),
-        levels=np.concatenate([rest.levels, rest.levels[cells]]),
-        low=np.concatenate([rest.low, label_min(height, own, n)]),
-        high=np.concatenate([high, label_max(height, own, n)]),
-        entries=np.concatenate([remaining, entries]),
-    )
     apart = replace(
         found,
         cell_of_point=cell_of_point,
-        cells=with_own,
+        cells=_divided(found.cells, cells, hanging.below_m[cells], own, found.height[point]),
         sample=sample,
         sampled=found.points.take(sample),
         air=found.air.followed_by(cells),
     )
     return apart, np.concatenate([cluster, hanging.cluster[cells]]), replace(sizes, points=points)
+
+
+def _divided(cells: Cells, divided: Int, below_m: Float32, own: Int, height: Float32) -> Cells:
+    """All cells, the n divided ones up to (n,) below_m [m], then n cells of the points above.
+
+    Args:
+        cells: before.
+        divided: (n,) their numbers.
+        below_m: (n,) height above which the points get cells of their own [m].
+        own: (K,) number of the new cell of each of these points, from 0 on.
+        height: (K,) their heights above ground [m].
+    """
+    n = len(divided)
+    entries = np.bincount(own, minlength=n)
+    high = cells.high.copy()
+    high[divided] = below_m
+    remaining = cells.entries.copy()
+    remaining[divided] -= entries
+    return Cells(
+        row=np.concatenate([cells.row, cells.row[divided]]),
+        column=np.concatenate([cells.column, cells.column[divided]]),
+        levels=np.concatenate([cells.levels, cells.levels[divided]]),
+        low=np.concatenate([cells.low, label_min(height, own, n)]),
+        high=np.concatenate([high, label_max(height, own, n)]),
+        entries=np.concatenate([remaining, entries]),
+    )
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,14 @@ class Overhangs(NamedTuple):
     below_m: Float32  # (C,) height above which the points hang [m], infinite where none do
     cluster: Int  # (C,) cluster of these points, NONE where there are none
 
+    @classmethod
+    def above(cls, cells: Int, top_m: Float32, cluster: Int) -> Overhangs:
+        """What hangs above (C,) top_m in some cells, in the (C,) cluster of its cell."""
+        hanging = cls(np.full(len(cluster), np.inf, np.float32), np.full(len(cluster), NONE))
+        hanging.below_m[cells] = top_m[cells]
+        hanging.cluster[cells] = cluster[cells]
+        return hanging
+
 
 def levels_of(height: Float32) -> Int32:
     """(n,) the bit of the level of each height above ground [m]."""
