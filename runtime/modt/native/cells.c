@@ -2,7 +2,7 @@
 #include "kernels.h"
 
 #define FAR_M 1e6f /* of grids.py */
-enum { LEVELS_PER_M = 10, N_LEVELS = 31 }; /* of overhang.py */
+enum { LEVELS_PER_M = 10, N_LEVELS = 31, BLOCK_CELLS = 3 }; /* of overhang.py */
 
 /* Cells of cells.py: n occupied cells of a square grid. */
 typedef struct {
@@ -452,10 +452,13 @@ typedef struct {
     float *surface_top_m;           /* (n,) greatest height of the surfaces of its cluster, infinite without any */
     float *front_m, *back_m;        /* (n,) greatest and least of those of each part */
     float *top_m;                   /* (n,) height up to which a cell stands */
-    i32 *of_block;                  /* (side * side,) levels of each block of cells */
+    i32 *of_block;                  /* (blocks, blocks) levels of each block of cells */
     i32 *n_cells, *n_below;         /* (n,) cells of each part, and those below a gap */
     SurfaceScratch surface;
 } ClusterScratch;
+
+/* Blocks of cells along a side of the grid */
+static inline i32 blocks_of(i32 side) { return side / BLOCK_CELLS + 1; }
 
 /* Places the scratch at `memory`; returns its size in bytes. */
 static i64 place_scratch(i64 n, i32 side, void *memory, ClusterScratch *s)
@@ -492,7 +495,7 @@ static i64 place_scratch(i64 n, i32 side, void *memory, ClusterScratch *s)
     TAKE(&end, s->front_m, n);
     TAKE(&end, s->back_m, n);
     TAKE(&end, s->top_m, n);
-    TAKE(&end, s->of_block, side * side);
+    TAKE(&end, s->of_block, blocks_of(side) * blocks_of(side));
     TAKE(&end, s->n_cells, n);
     TAKE(&end, s->n_below, n);
     place_surface_scratch(n, &end, &s->surface);
@@ -863,7 +866,7 @@ static void find_leaving(const ClusterRules *rules, const StructureRules *struct
 /* OverhangTuning: values by the names that they have there. */
 typedef struct {
     float max_range_m, min_top_m, gap_m, gap_beams, max_gap_m, min_share, max_person_m;
-    i32 block_cells, first_level, last_level;
+    i32 first_level, last_level;
     i64 min_points;
 } OverhangRules;
 
@@ -890,12 +893,12 @@ static i64 find_standing_cells(const ClusterRules *rules, const StructureRules *
                                const OverhangRules *overhang, const Cells *cells, const float *beam_m, i64 n_cells,
                                const i64 *cluster, const ClusterSizes *sizes, const ClusterScratch *s)
 {
-    const i32 side = rules->fine_side, block = overhang->block_cells, blocks = side / block + 1;
+    const i32 blocks = blocks_of(rules->fine_side);
     i64 n_used = 0;
     for (i64 k = 0; k < blocks * blocks; k++)
         s->of_block[k] = 0;
     for (i64 i = 0; i < n_cells; i++)
-        s->of_block[cells->row[i] / block * blocks + cells->column[i] / block] |= cells->levels[i];
+        s->of_block[cells->row[i] / BLOCK_CELLS * blocks + cells->column[i] / BLOCK_CELLS] |= cells->levels[i];
     for (i64 i = 0; i < n_cells; i++) {
         i64 g = cluster[i];
         int tried = sizes->extent_m[g] > rules->min_extent_m && sizes->points[g] >= 2 * rules->min_points &&
@@ -903,7 +906,7 @@ static i64 find_standing_cells(const ClusterRules *rules, const StructureRules *
                     sizes->sqrt_range[g] * sizes->sqrt_range[g] < overhang->max_range_m;
         if (!tried || cells->low[i] > structure->hanging_m || overhang->gap_beams * beam_m[i] > overhang->max_gap_m)
             continue;
-        i32 around = s->of_block[cells->row[i] / block * blocks + cells->column[i] / block];
+        i32 around = s->of_block[cells->row[i] / BLOCK_CELLS * blocks + cells->column[i] / BLOCK_CELLS];
         s->top_m[i] = standing_top_m(overhang, around, cells->levels[i], cells->high[i], beam_m[i]);
         s->used[n_used] = (i32)i; /* overwritten by the next, unless it stands */
         n_used += s->top_m[i] > 0;

@@ -18,6 +18,8 @@ LEVELS_PER_M = 10
 """Levels of height in a metre."""
 N_LEVELS = 31
 """Number of levels, a bit each. The highest holds all points above."""
+BLOCK_CELLS = 3
+"""Side of a block of cells that shows a gap. In single cells, few returns of a van leave gaps by chance."""
 
 
 class Overhangs(NamedTuple):
@@ -56,9 +58,9 @@ def standing_top_m(
         levels: (C,) levels of height with a point.
         high: (C,) greatest height of the points above ground [m].
         beam_m: (C,) vertical distance of neighbouring beams [m].
-        tuning: gaps and blocks.
+        tuning: gaps.
     """
-    around = _of_blocks(row, column, levels, tuning.block_cells)
+    around = _of_blocks(row, column, levels)
     gap_m = np.maximum(np.float32(tuning.gap_m), np.float32(tuning.gap_beams) * beam_m)
     n_empty = np.minimum(np.ceil(gap_m * np.float32(LEVELS_PER_M)), N_LEVELS).astype(np.int64)
     first = np.full(len(row), N_LEVELS)
@@ -71,9 +73,9 @@ def standing_top_m(
     return np.where(first < N_LEVELS, top_m, high)
 
 
-def _of_blocks(row: Int32, column: Int32, levels: Int32, side: int) -> Int:
+def _of_blocks(row: Int32, column: Int32, levels: Int32) -> Int:
     """(C,) levels of the block of cells in which each lies."""
-    block = ((row // side).astype(np.int64) << 32) + column // side
+    block = ((row // BLOCK_CELLS).astype(np.int64) << 32) + column // BLOCK_CELLS
     _, number = np.unique(block, return_inverse=True)
     of_block = np.zeros(int(number.max(initial=NONE)) + 1, np.int64)
     np.bitwise_or.at(of_block, number, levels)

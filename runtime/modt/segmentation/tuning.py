@@ -301,8 +301,6 @@ class OverhangTuning:
     """Range of a cluster up to which they are looked for [m]. More takes shrubs below trees for people."""
     min_top_m: float = 1.95
     """Least height of the top of the cluster [m]. Less costs time."""
-    block_cells: int = 3
-    """Side of a block of cells whose points show a gap. Fewer: by chance few points of a van leave one."""
     gap_m: float = 0.2
     """Least height of a gap [m]. More keeps people joined to what hangs right above them."""
     gap_beams: float = 1.5
