@@ -284,7 +284,7 @@ class StructureTuning:
     max_hidden_m: float = 1.5
     """Greatest distance behind a surface of a person whom it hides in part [m]."""
     min_above_m: float = 0.25
-    """Least height of such a person above the surfaces [m]. Less takes the seats of cars for people."""
+    """Least height above the surfaces of a person whom they hide in part [m]. Less takes seats of cars for people."""
     min_part_extent_m: float = 0.2
     """Least extent of a part that stands out and is no possible person [m]. Less takes posts of fences."""
     hanging_m: float = 1.6
@@ -298,13 +298,13 @@ class OverhangTuning:
     """People below something that hangs. Chosen on: posed crowns, awnings and lintels, with a check on streets."""
 
     max_range_m: float = 10.0
-    """Range of a cluster up to which they are looked for [m]. More takes shrubs below trees for people."""
+    """Range of a cluster up to which people below it are looked for [m]. More takes shrubs below trees for people."""
     min_top_m: float = 1.95
-    """Least height of the top of the cluster [m]. Less costs time."""
+    """Least height of the top of a cluster in which people stand below what hangs [m]. Less costs time."""
     gap_m: float = 0.2
     """Least height of a gap [m]. More keeps people joined to what hangs right above them."""
     gap_beams: float = 1.5
-    """The same in spacings of the beams. Less takes the spacing for a gap."""
+    """Least height of a gap in spacings of the beams; the greater of both counts. Less takes the spacing for a gap."""
     max_gap_m: float = 0.6
     """Gap from which on the beams are too far apart to show one [m]."""
     first_level: int = 10
@@ -314,9 +314,9 @@ class OverhangTuning:
     min_share: float = 0.2
     """Least share of a person's cells below a gap. Less takes shrubs beside a crown for people."""
     max_person_m: float = 2.0
-    """Greatest height of such a person [m]. More takes trunks for people."""
+    """Greatest height of a person below what hangs [m]. More takes trunks for people."""
     min_points: int = 20
-    """Points below which a part is no person. Less takes twigs for people."""
+    """Points from which a part below a gap may be a person. Less takes twigs for people."""
 
 
 @dataclass(frozen=True)
@@ -365,7 +365,8 @@ class StripTuning:
     hidden_person: PersonSize = HIDDEN_PERSON
     """Size of the farther strip if it may be a person whom the nearer one hides."""
     max_hidden_range_m: float = 20.0
-    """Range up to which it may be one [m]. More takes the roofs of far cars off, which few returns meet."""
+    """Range up to which the farther strip may be a person whom the nearer one hides [m]. More takes the roofs of far
+    cars off, which few returns meet."""
     min_points: int = 2
     """Least number of points of a strip. Chosen on: KITTI scans thinned to fewer beams, as the values below."""
     visible_m: float = 1.5
@@ -400,13 +401,14 @@ class SupportTuning:
     """
 
     person: PersonSize = RAISED_PERSON
-    """Size of a proposal that may be such a person."""
+    """Size of a proposal that may be a person on a platform."""
     min_step_m: float = 0.3
-    """Least height of its lowest point above the ground [m]. Lower platforms hardly matter."""
+    """Least height above the ground of the lowest point of a person on a platform [m]. Lower ones hardly matter."""
     max_step_m: float = 1.15
-    """Greatest height of its lowest point above the ground [m]: the edge of a platform hides feet. More are signs."""
+    """Greatest height above the ground of the lowest point of a person on a platform [m], whose edge hides feet. More
+    takes signs for people."""
     min_points: int = 20
-    """Points from which a proposal may be such a person. With fewer, far poles and branches are called people."""
+    """Points from which a proposal may be a person on a platform. Less takes far poles and branches for people."""
 
 
 @dataclass(frozen=True)
