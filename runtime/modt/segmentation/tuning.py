@@ -304,7 +304,7 @@ class OverhangTuning:
     gap_m: float = 0.2
     """Least height of a gap [m]. More keeps people joined to what hangs right above them."""
     gap_beams: float = 1.5
-    """Least height of a gap in spacings of the beams; the greater of both counts. Less takes the spacing for a gap."""
+    """Least height of a gap in spacings of the beams; the greater of both counts. Less takes spacings for gaps."""
     max_gap_m: float = 0.6
     """Gap from which on the beams are too far apart to show one [m]."""
     first_level: int = 10
