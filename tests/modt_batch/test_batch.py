@@ -135,6 +135,15 @@ def wait_for_a_run(out):
         time.sleep(0.02)
 
 
+@pytest.fixture
+def interruptible():
+    """Processes begun here obey a Ctrl-C, also where the suite is in the background of a script, which ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_ctrl_c_keeps_the_runs_that_are_done_and_they_are_not_done_again(drives, whole, tmp_path, jobs):
     out = tmp_path / "out"
