@@ -158,7 +158,8 @@ def _local(address: str, copy: Path) -> Path:
     source = str(path).rstrip("/")
     parent, _, name = source.rpartition("/")
     copy.mkdir()
-    files.get(source, str(copy / name), recursive=True)
+    found = files.find(source)  # the names of files are copied one by one, as `get` would take brackets for a pattern
+    files.get(found, [str(copy / name) + file.removeprefix(source) for file in found])
     for entry in files.ls(parent, detail=True) if parent else ():
         beside = entry["name"].rpartition("/")[2]
         if entry["type"] == "file" and beside != name and entry["size"] <= BESIDE_BYTES:
