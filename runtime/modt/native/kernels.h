@@ -89,7 +89,7 @@ static ALWAYS_INLINE float pseudo_angle(float x, float y)
 /* Reserves scratch for an array of this many elements at the address `*end`, which then moves past it. A pass
  * reserves all its arrays in one function. Run with address 0, that function returns the size needed; with memory it
  * sets the pointers. In a checked build each array is allocated alone, so that AddressSanitizer sees where it ends, and
- * freed when the next scratch is reserved, from its first address on. */
+ * freed some passes later. */
 #define TAKE(end, array, elements) ((array) = take(end, (elements) * sizeof *(array)))
 static inline void *take(uintptr_t *end, uintptr_t bytes)
 {
@@ -97,16 +97,13 @@ static inline void *take(uintptr_t *end, uintptr_t bytes)
     void *start = (void *)*end;
     *end += (bytes + CACHE_LINE - 1) / CACHE_LINE * CACHE_LINE;
 #ifdef MODT_CHECKED
-    enum { MOST = 64 };
-    static void *taken[MOST], *latest;
-    static int n_taken;
+    enum { N_KEPT = 64 }; /* more than the arrays of one pass */
+    static void *kept[N_KEPT];
+    static int oldest;
     if (start) {
-        for (; start < latest && n_taken; n_taken--)
-            free(taken[n_taken - 1]);
-        latest = start;
-        start = malloc(bytes);
-        if (n_taken < MOST)
-            taken[n_taken++] = start;
+        free(kept[oldest]);
+        kept[oldest] = start = malloc(bytes);
+        oldest = (oldest + 1) % N_KEPT;
     }
 #endif
     return start;

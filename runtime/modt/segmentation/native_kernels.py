@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Hashable
 from dataclasses import fields
+from functools import lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -43,6 +44,11 @@ STRIP_RULES = structure("StripRules")
 OVERHANG_RULES = structure("OverhangRules")
 CLUSTERS = structure("Clusters")
 MEMBERS = structure("Members")
+
+
+def _from_sources(fill: Callable[..., Filled], *sources: Hashable) -> Filled:
+    """Structure that a function fills."""
+    return fill(*sources)
 
 
 def _filled(layout: Layout, *sources: object, **others: Any) -> Filled:
@@ -106,7 +112,8 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         super().__init__(library, tuning)
         declare(library, "ground.c", "cells.c", "heads.c", "groups.c")
         self.name = f"native ({instructions})"
-        self._structures: dict[Hashable, Filled] = {}
+        # Structures filled from objects that do not change. Those of a segmenter are 14, and hold its grids.
+        self._structure = lru_cache(maxsize=32)(_from_sources)
         self._scratch = np.empty(0, np.uint8)
 
     def above_ground(self, ground: GroundEstimator, points: Float32, sensor_height_m: float, bounds: Bounds) -> Above:
@@ -370,14 +377,6 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         statistics = np.empty((n, N_REFLECTANCE))
         self.library.modt_reflectance_statistics(points, points.shape[1], index, offsets, n, BRIGHT, DARK, statistics)
         return statistics
-
-    def _structure(self, fill: Callable[..., Filled], *sources: Hashable) -> Filled:
-        """Structure filled from objects that do not change, once."""
-        key = (fill, *sources)
-        filled = self._structures.get(key)
-        if filled is None:
-            filled = self._structures[key] = fill(*sources)
-        return filled
 
     def _memory(self, size: int) -> NDArray[np.uint8]:
         """Scratch of at least this size [bytes], kept between calls: new pages take longer than the passes."""
