@@ -1,24 +1,14 @@
 """Small scans of known scenes: rays against a floor and upright boxes."""
 
 import numpy as np
-import pytest
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
-from modt.native import library
-from modt.segmentation.native_kernels import NativeKernels
 from modt.segmentation.segmenter import Segmenter
 from modt.segmentation.tuning import SegmentationTuning
 
 HDL_64E = np.deg2rad(np.linspace(-24.8, 2.0, 64))
 VLP_16 = np.deg2rad(np.linspace(-15.0, 15.0, 16))
-
-
-def compiled_kernels():
-    try:
-        return NativeKernels(*library.load())
-    except library.NotAvailableError as error:
-        pytest.skip(str(error))
 
 
 def elevation_deg(points):

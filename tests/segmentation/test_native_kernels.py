@@ -51,6 +51,7 @@ FULL = FieldOfView()
 FRONT = FieldOfView(np.array([[0.0, 1.0, 0.0, 0.0]]))
 SEEDS = st.integers(0, 10_000)
 GENERATORS = st.builds(np.random.default_rng, SEEDS)
+UP = np.deg2rad(np.linspace(-24, 20, 40))
 HOSTILE = [np.nan, np.inf, -np.inf, 1e-45, -1e-40, 3e38, -3e38, FAR_M, 999.0, 0.0, -0.0]
 
 
@@ -144,6 +145,25 @@ def test_the_points_of_a_ceiling(kernels):
         Segmenter(SegmentationConfig(), SensorConfig(height_m=0.8), FULL, each) for each in (NUMPY, kernels)
     )
     assert same(numpy.above_ground(points), native.above_ground(points))
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3], ids=["clear", "haze"])
+@pytest.mark.parametrize("seed", range(4))
+def test_people_at_and_in_a_wall_and_below_what_hangs_in_clear_air_and_haze(kernels, seed, share):
+    rng = np.random.default_rng(seed)
+    wall_m = rng.uniform(3.0, 5.0)
+    boxes = []
+    for x in np.arange(-9.0, 9.0, 4.0):
+        boxes.append((x, wall_m, 3.0, 0.2, 0.0, 2.5))
+        boxes.append((x + rng.uniform(-1, 1), wall_m - rng.uniform(0.3, 0.8), 0.4, 0.5, 0.0, rng.uniform(1.2, 1.9)))
+        boxes.append((x + 2.0, wall_m + rng.uniform(-0.3, 0.6), 0.4, 0.5, 0.0, 1.75))
+    for x, y, low_m in rng.uniform([-8, -8, 1.7], [8, -2, 2.3], (12, 3)):
+        boxes.append((x, y, 0.4, 0.5, 0.0, low_m - rng.uniform(0.1, 0.6)))
+        boxes.append((x + rng.normal(0, 0.3), y, *rng.uniform(0.4, 1.5, 2), low_m, low_m + 0.3))
+    points, _ = scans.scan(boxes, 0.8, UP, step_deg=0.6, seed=seed)
+    in_air = rng.random(len(points)) < share
+    points[in_air, :3] *= rng.uniform(0.1, 1.0, (in_air.sum(), 1)).astype(np.float32)
+    both(kernels, points, SensorConfig(height_m=0.8, elevation_step_deg=1.1, azimuth_step_deg=0.6))
 
 
 @given(seed=SEEDS, dead=st.sets(st.integers(0, 15), max_size=4))

@@ -4,17 +4,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.testing import assert_array_equal
 
-from modt.config import SegmentationConfig, SensorConfig
-from modt.segmentation.cells import CellClusterer
+from modt.config import SegmentationConfig
 from modt.segmentation.clustering import Clusterer
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.kernels import NUMPY
 from modt.segmentation.overhang import LEVELS_PER_M, N_LEVELS, levels_of, standing_top_m
 from modt.segmentation.tuning import OverhangTuning
 from modt.types import NONE
-from tests.segmentation.scans import compiled_kernels
 from tests.segmentation.test_structure import SENSOR, label
 
 TUNING = OverhangTuning()
@@ -71,9 +68,9 @@ def test_a_gap_is_more_than_the_spacing_of_the_beams():
     assert one_cell([*np.arange(0.3, 1.7, 0.1), 2.1], beam_m=0.35) == pytest.approx(2.1)
 
 
-def clustered(points, kernels=NUMPY):
+def clustered(points):
     columns = PointColumns.from_array(points.astype(np.float32))
-    clusterer = Clusterer(SENSOR, SegmentationConfig(), kernels)
+    clusterer = Clusterer(SENSOR, SegmentationConfig(), NUMPY)
     return clusterer.cluster(clusterer.occupied_cells(columns, columns.z))
 
 
@@ -93,22 +90,3 @@ def test_a_van_that_few_returns_meet_is_not_divided(seed):
     side = np.column_stack([x.ravel(), np.full(x.size, 6.0), z.ravel()])
     few = side[np.random.default_rng(seed).random(len(side)) < 0.2]
     assert set(label(clustered(few))) == {0}
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_compiled_kernels_find_the_same_people_and_the_same_that_hangs(seed):
-    rng = np.random.default_rng(seed)
-    parts = [person(*rng.uniform(-6, 6, 2)) for _ in range(5)]
-    parts += [disc(*(part.mean(axis=0)[:2] + rng.normal(0, 0.4, 2)), rng.uniform(1.8, 2.4)) for part in parts]
-    points = np.concatenate(parts) + rng.normal(0, 0.02, 3)
-    columns = PointColumns.from_array(points[rng.random(len(points)) < 0.8].astype(np.float32))
-    clusterer = CellClusterer(SensorConfig(max_range_m=60.0), SegmentationConfig())
-    kernels = compiled_kernels()
-    cells, _, sampled, _ = kernels.occupied_cells(clusterer.fine, columns, columns.z)
-    beam_m = np.full(len(cells), rng.choice([0.02, 0.1, 0.3]), np.float32)
-    cluster, sizes, hanging = NUMPY.cluster(clusterer, cells, sampled, beam_m)
-    compiled = kernels.cluster(clusterer, cells, sampled, beam_m)
-    assert_array_equal(compiled[0], cluster)
-    assert_array_equal(compiled[1].points, sizes.points)
-    assert_array_equal(compiled[2].below_m, hanging.below_m)
-    assert_array_equal(compiled[2].cluster, hanging.cluster)

@@ -4,17 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.segmentation.cells import CellClusterer
 from modt.segmentation.clustering import Clusterer
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.kernels import NUMPY
 from modt.segmentation.structure import find_surfaces
 from modt.segmentation.tuning import SegmentationTuning
 from modt.types import NONE, PointKind
-from tests.segmentation.scans import compiled_kernels
 
 TUNING = SegmentationTuning().structure
 SENSOR = SensorConfig(max_range_m=60.0, azimuth_step_deg=0.2)
@@ -39,10 +37,10 @@ def person(x, y):
     return np.concatenate([np.column_stack([ring, np.full(len(ring), z)]) for z in np.arange(0.3, 1.7, 0.1)])
 
 
-def clustered(points, kernels=NUMPY):
+def clustered(points):
     """Clusters of points whose heights above ground are their z."""
     columns = PointColumns.from_array(points.astype(np.float32))
-    clusterer = Clusterer(SENSOR, SegmentationConfig(), kernels)
+    clusterer = Clusterer(SENSOR, SegmentationConfig(), NUMPY)
     return clusterer.cluster(clusterer.occupied_cells(columns, columns.z))
 
 
@@ -117,25 +115,6 @@ def test_a_beam_above_does_not_join_people():
     one, other = people.reshape(2, -1)
     assert set(one).isdisjoint(other)
     assert NONE not in people
-
-
-def test_compiled_kernels_find_the_same_parts():
-    kernels = compiled_kernels()
-    rng = np.random.default_rng(5)
-    clusterer = CellClusterer(SENSOR, SegmentationConfig())
-    for _ in range(30):
-        parts = [wall(*np.sort(rng.uniform(-12, 12, 2)), rng.uniform(2, 8)) for _ in range(3)]
-        parts += [person(*rng.uniform(-8, 8, 2)) for _ in range(6)]
-        turn = rng.uniform(0, 2 * np.pi)
-        points = np.concatenate(parts) + rng.normal(0, 0.02, 3)
-        points[:, :2] = points[:, :2] @ np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-        columns = PointColumns.from_array(points.astype(np.float32))
-        cells, _, sampled, _ = kernels.occupied_cells(clusterer.fine, columns, columns.z)
-        beam_m = np.full(len(cells), 0.1, np.float32)
-        expected, sizes, _ = NUMPY.cluster(clusterer, cells, sampled, beam_m)
-        cluster, compiled_sizes, _ = kernels.cluster(clusterer, cells, sampled, beam_m)
-        assert_array_equal(cluster, expected)
-        assert_array_equal(compiled_sizes.points, sizes.points)
 
 
 @pytest.mark.parametrize("seed", range(3))
