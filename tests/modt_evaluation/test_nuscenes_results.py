@@ -19,14 +19,14 @@ NAME = "scene-0103"
 """A scene of the split mini_val."""
 
 
-def random_scene(root, seed, samples=6):
+def random_scene(root, seed):
     """A scene of objects that go about; some are labelled in some samples alone, some hold no point."""
     rng = np.random.default_rng(seed)
     kinds = rng.integers(0, len(CATEGORIES), 40)
     places = rng.uniform(-60, 60, (40, 2))
     speeds = rng.normal(0, 2, (40, 2))
     sweeps = []
-    for k in range(samples):
+    for k in range(6):
         boxes = []
         for i in np.flatnonzero(rng.random(40) < 0.8).tolist():
             x, y = (places[i] + 0.5 * k * speeds[i]).tolist()

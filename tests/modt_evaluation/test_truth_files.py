@@ -99,9 +99,9 @@ def test_object_labels_have_no_identities(tmp_path):
     assert truth.frames[7].object_class.tolist() == [ObjectClass.PEDESTRIAN]
 
 
-def cuboids(folder, text, poses=2):
+def cuboids(folder, text):
     folder.joinpath("truth.csv").write_text(CUBOID + text)
-    folder.joinpath("poses.txt").write_text("1 0 0 5 0 1 0 0 0 0 1 0\n" * poses)
+    folder.joinpath("poses.txt").write_text("1 0 0 5 0 1 0 0 0 0 1 0\n" * 2)
     return folder
 
 

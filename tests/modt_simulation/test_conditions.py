@@ -19,10 +19,10 @@ def sweep(index=4, sensor="vlp-16", **conditions):
     return SyntheticStream("yard", sensor, 2.0, 7, **conditions).simulator.sweep(index)
 
 
-def beams(frame, sensor="vlp-16"):
+def beams(frame):
     """(N,) number of the beam of each point."""
     elevation = np.arctan2(frame.points[:, 2], np.hypot(*frame.points[:, :2].T))
-    return np.abs(elevation[:, None] - SENSORS[sensor].elevation_rad).argmin(axis=1)
+    return np.abs(elevation[:, None] - SENSORS["vlp-16"].elevation_rad).argmin(axis=1)
 
 
 @pytest.mark.parametrize("weather", WEATHER)

@@ -18,10 +18,10 @@ from modt_viewer.truth_marks import _objects
 from modt_viewer.view import Grid
 
 
-def track(id_, box, world, state="tracked", class_="car"):
+def track(id_, box, world, state="tracked"):
     """A track of a line of tracks.jsonl."""
     return {
-        "id": id_, "state": state, "class": class_, "posterior": [0.1, 0.7, 0.15, 0.05],
+        "id": id_, "state": state, "class": "car", "posterior": [0.1, 0.7, 0.15, 0.05],
         "witness": [0.0, 1.5, -0.6, 0.2], "viewed": True, "final": False, "heading_known": False, "size": [0.0] * 3,
         "motion": "unknown", "moving": 0.5, "velocity": [0.0] * 2, "velocity_covariance": [0.0] * 3,
         "proposal": None if box is None else 0, "points": 12, "age": 3, "missed": 0,

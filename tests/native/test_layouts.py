@@ -20,13 +20,13 @@ SHAPES = Layout(
 )
 
 
-def values(n=3, k=4):
+def values():
     return {
-        "kdop": np.zeros((8, n)),
-        "top": np.zeros(n, np.float32),
-        "xy": np.zeros((2, k), np.float32),
+        "kdop": np.zeros((8, 3)),
+        "top": np.zeros(3, np.float32),
+        "xy": np.zeros((2, 4), np.float32),
         "pad_m": 0.1,
-        "n": n,
+        "n": 3,
     }
 
 

@@ -19,9 +19,9 @@ REAR = np.array([15.0, 0.0, -1.0, 4.2, 1.8, 1.5, 0.0])
 WALKER = np.array([8.0, -3.0, -0.9, 1.0, 0.6, 1.7, 2.0])
 
 
-def visible_points(box, sides=("near", "side"), rng=None):
+def visible_points(box, sides=("near", "side")):
     """(3, n) points on the faces of a box [sensor frame] that a sensor at the origin sees."""
-    rng = rng or np.random.default_rng(0)
+    rng = np.random.default_rng(0)
     length, width, height = box[3:6]
     c, s = np.cos(box[6]), np.sin(box[6])
     u, v = -(c * box[0] + s * box[1]), -(c * box[1] - s * box[0])  # the sensor, from the box

@@ -8,10 +8,10 @@ from modt.poses.leap_watch import LeapWatch
 from modt.types import Frame
 
 
-def frames(leap_m, at=30, n=60, noise_m=0.0, speed_mps=5.0):
+def frames(leap_m, noise_m=0.0):
     rng = np.random.default_rng(0)
-    for k in range(n):
-        place = np.array([0.1 * speed_mps * k, leap_m * (k >= at), 0.0]) + rng.normal(0, noise_m, 3)
+    for k in range(60):
+        place = np.array([0.5 * k, leap_m * (k >= 30), 0.0]) + rng.normal(0, noise_m, 3)
         yield Frame(k, 0.1 * k, np.zeros((1, 4), np.float32), se3(rotation_zyx(0, 0, 0.05 * k), place))
 
 

@@ -20,9 +20,9 @@ def degrees(gaps):
     return np.rad2deg(np.arctan(gaps))
 
 
-def without_beam(dead_deg, x, y=0.0):
+def without_beam(dead_deg, x):
     """A sweep of a car without a beam, and which of its points are on the car."""
-    points, on = scans.scan([(x, y, *CAR)], MOUNT_M, scans.VLP_16, step_deg=0.2)
+    points, on = scans.scan([(x, 0.0, *CAR)], MOUNT_M, scans.VLP_16, step_deg=0.2)
     alive = np.abs(scans.elevation_deg(points) - dead_deg) > 0.5
     return points[alive], on[alive] == 1
 

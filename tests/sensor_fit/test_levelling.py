@@ -115,7 +115,7 @@ def test_without_a_floor_roll_and_pitch_of_the_poses_count_and_else_the_mount():
     assert tilt_left_deg(frame, level) < 1.0
 
 
-def floor(slope, rate, bend=(0.0, 0.0), depth_m=0.8, n=2000, outliers=0.3):
+def floor(slope, rate, bend=(0.0, 0.0), n=2000):
     """(3, n) points of a sloping floor, of which a share stands above it, and their (n,) delays [s]."""
     rng = np.random.default_rng(2)
     distance_m = rng.uniform(1.5, 11, n)
@@ -124,8 +124,8 @@ def floor(slope, rate, bend=(0.0, 0.0), depth_m=0.8, n=2000, outliers=0.3):
     y = distance_m * np.sin(bearing)
     delay_s = -bearing * 0.1 / (2 * np.pi)
     x_slope, y_slope = (s + delay_s * (r + delay_s * b) for s, r, b in zip(slope, rate, bend, strict=True))
-    z = -depth_m - x_slope * x - y_slope * y
-    z += rng.normal(0, 0.01, n) + np.where(rng.random(n) < outliers, rng.uniform(0.3, 2.0, n), 0.0)
+    z = -0.8 - x_slope * x - y_slope * y
+    z += rng.normal(0, 0.01, n) + np.where(rng.random(n) < 0.3, rng.uniform(0.3, 2.0, n), 0.0)
     return np.stack([x, y, z]), delay_s
 
 

@@ -18,8 +18,8 @@ MOUNTS = [(0.0, 0.0), (0.0, 15.0), (-15.0, 0.0), (8.0, -10.0), (180.0, 0.0), (17
 HEIGHTS_M = {"vlp-16": 0.8, "os1-64": 0.5, "mid-360": 0.3}
 
 
-def stream(scene, sensor, mount_deg, seed=3):
-    return SyntheticStream(scene, sensor, 2.0, seed, height_m=HEIGHTS_M[sensor], mount_deg=mount_deg)
+def stream(scene, sensor, mount_deg):
+    return SyntheticStream(scene, sensor, 2.0, 3, height_m=HEIGHTS_M[sensor], mount_deg=mount_deg)
 
 
 @pytest.mark.parametrize("mount_deg", MOUNTS)

@@ -13,9 +13,9 @@ from tests.sources import layouts
 from tests.sources.datasets import BEGAN_US, MOUNT_M, Sweep, write_argoverse, write_nuscenes
 
 
-def points(seed=0, n=60):
-    table = np.random.default_rng(seed).uniform(-20, 20, (n, 4)).astype(np.float32)
-    table[:, 3] = np.random.default_rng(seed).integers(0, 255, n)
+def points(seed=0):
+    table = np.random.default_rng(seed).uniform(-20, 20, (60, 4)).astype(np.float32)
+    table[:, 3] = np.random.default_rng(seed).integers(0, 255, 60)
     return table
 
 
