@@ -32,7 +32,3 @@ def test_precision_counts_labelled_points_alone():
     assert (score.precision, score.recall) == (50.0, 50.0)
     assert score.cells() == "50.00 | 50.00 | 50.00"
     assert len(list(ground.rows({"all": found}, [scan()], ground.RANGES_M))) == 2
-
-
-def test_without_labelled_scans_there_are_none(tmp_path):
-    assert ground.labelled_scans(tmp_path) == []
