@@ -163,6 +163,9 @@ def test_people_at_and_in_a_wall_and_below_what_hangs_in_clear_air_and_haze(kern
     points, _ = scans.scan(boxes, 0.8, UP, step_deg=0.6, seed=seed)
     in_air = rng.random(len(points)) < share
     points[in_air, :3] *= rng.uniform(0.1, 1.0, (in_air.sum(), 1)).astype(np.float32)
+    turn_rad = rng.uniform(0, 2 * np.pi)
+    turn = np.array([[np.cos(turn_rad), -np.sin(turn_rad)], [np.sin(turn_rad), np.cos(turn_rad)]])
+    points[:, :2] = points[:, :2] @ turn
     both(kernels, points, SensorConfig(height_m=0.8, elevation_step_deg=1.1, azimuth_step_deg=0.6))
 
 

@@ -79,12 +79,13 @@ def leaves(share):
     """A scan of a person and of a bush in which a share of the rays ends; what each lies on, AIR of it."""
     rng = np.random.default_rng(0)
     centre = (3.0, 3.0, 0.0)
+    radius_m = 1.0
     points, on = scans.scan((PERSON,), elevation=scans.VLP_16, step_deg=STEP_DEG)
     range_m = np.linalg.norm(points[:, :3], axis=1)
     direction = points[:, :3] / range_m[:, None]
     along_m = direction @ centre
     apart_m = np.sqrt(np.maximum(np.dot(centre, centre) - along_m**2, 0.0))
-    half_m = np.sqrt(np.maximum(1.0 - apart_m**2, 0.0))
+    half_m = np.sqrt(np.maximum(radius_m**2 - apart_m**2, 0.0))
     ends_m = rng.uniform(along_m - half_m, along_m + half_m)
     in_leaves = (along_m > 0) & (half_m > 0) & (ends_m < range_m) & (rng.random(len(points)) < share)
     points[in_leaves, :3] = (direction * ends_m[:, None])[in_leaves]
