@@ -55,7 +55,7 @@ def trace(lowest, top, estimator, height_m, max_slope_deg):
     height_m_of_cell = lowest.astype(float)
     last = [(-height_m, 0.0, 0.0)] * SECTORS
     for ring in range(len(range_m)):
-        may_join, hidden = [], []
+        may_join, hidden, may_be_reached, reached = [], [], [], []
         sure = is_ground[ring].copy()
         for ray in np.flatnonzero(np.isfinite(lowest[ring])).tolist():
             height, at, slope = last[ray]
@@ -79,10 +79,20 @@ def trace(lowest, top, estimator, height_m, max_slope_deg):
                 hidden.append(ray)
             if flat and off < gap * hill_slope:
                 may_join.append(ray)
+                may_be_reached += [ray] if stays_up else []
+            if sure[ray] and (at > 0 or off < ground.noise_m):
+                reached.append(ray)
+        max_rise_m = 2 * np.pi / SECTORS * range_m[ring] * max_slope
+        for ray in reached:  # which grows
+            for beside in (ray - 1) % SECTORS, (ray + 1) % SECTORS:
+                step_m = np.abs(lowest[ring, beside] - lowest[ring, ray])
+                if beside in may_be_reached and step_m < max_rise_m[beside] + ground.noise_m:
+                    may_be_reached.remove(beside)
+                    reached.append(beside)
+                    sure[beside] = is_ground[ring, beside] = True
         for ray in may_join + hidden:
-            max_rise_m = 2 * np.pi / SECTORS * range_m[ring, ray] * max_slope
             around = [beside for beside in (ray - 1, (ray + 1) % SECTORS) if sure[beside]]
-            continues = (np.abs(lowest[ring, around] - lowest[ring, ray]) < max_rise_m).any()
+            continues = (np.abs(lowest[ring, around] - lowest[ring, ray]) < max_rise_m[ray]).any()
             if continues and ray in may_join:
                 is_ground[ring, ray] = True
             elif not continues and ray in hidden:

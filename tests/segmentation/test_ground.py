@@ -191,6 +191,17 @@ def test_a_hill_opposite_is_ground(elevation):
     assert (np.abs(heights(near, ground(height_m=0.8, min_range_m=0.4), 0.8)) < 0.25).mean() > 0.98
 
 
+@pytest.mark.parametrize(
+    ("elevation", "height_m", "bend"),
+    [(scans.HDL_64E, 1.7, 0.08), (np.deg2rad(np.linspace(-22.5, 22.5, 64)), 0.8, 0.16)],
+)
+def test_the_sides_of_a_valley_are_ground(elevation, height_m, bend):
+    """They rise nearer than all visible ground there, but the ground along the valley leads to them."""
+    points = on_floor(lambda x, y: 0.5 * bend * x**2 - height_m + 0.0 * y, elevation=elevation)
+    near = points[np.hypot(points[:, 0], points[:, 1]) < 4.5]
+    assert (np.abs(heights(near, ground(height_m=height_m, min_range_m=0.4), height_m)) < 0.2).mean() > 0.99
+
+
 def with_person(profile, x, floor_z, elevation=scans.VLP_16):
     """(n, 4) points of a sweep over a floor, and (n,) those on a person of 1.7 m at x ahead with feet at floor_z."""
     direction = scans.rays(step_deg=0.2, elevation=elevation)

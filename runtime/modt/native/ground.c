@@ -240,8 +240,8 @@ static void close_round(const void *row, i64 step, i64 size, void *round)
 }
 
 /* What may become of a cell by the rays beside its own: ground, if it continues theirs; the foot of something, which
- * is hidden, if it does not. */
-typedef enum { MAY_JOIN = 1, MAY_HIDE = 2 } Beside;
+ * is hidden, if it does not; ground, if it is reached along the ring. REACHED: it is, or it begins there. */
+typedef enum { MAY_JOIN = 1, MAY_HIDE = 2, MAY_BE_REACHED = 4, REACHED = 8 } Beside;
 
 /* The first half of Rays.advance for one ring, behind which are the ends `behind`: cells that continue the ground of
  * their own rays, and cells in which something stands. `surface`: in, lowest return behind each cell; out, height of
@@ -272,12 +272,39 @@ static void follow_rays(const Ground *g, i32 ring, float (*restrict ends)[2], fl
         int stands = may_fall & (is_flat == 0);
         surface[k] = height[k];
         range_before[k] = range[k];
-        sure[k] = found & (is_flat | (is_below == 0)) ? lowest[k] : NAN;
+        int is_sure = found & (is_flat | (is_below == 0));
+        int is_reached = is_sure & ((range[k] > 0.0f) | (residual < c.noise_m));
+        sure[k] = is_sure ? lowest[k] : NAN;
         int may_join = is_flat & (residual < gap * c.hill_slope);
         int may_hide = stands & is_below & (gap > c.near_m);
-        may[k] = (uint8_t)(may_join * MAY_JOIN | may_hide * MAY_HIDE);
+        may[k] = (uint8_t)(may_join * MAY_JOIN | may_hide * MAY_HIDE | (may_join & stays_up) * MAY_BE_REACHED |
+                           is_reached * REACHED);
         kind[k] = (uint8_t)(found * GROUND | stands * STANDS);
     }
+}
+
+/* Rays._reached: ground goes on from cell to cell, in both directions along a ring. */
+static void reach_along(const Ground *g, i32 ring, const float *lowest, uint8_t *may, float *sure, uint8_t *kind)
+{
+    i32 last = g->sectors - 1;
+    uint8_t is_missed = 0; /* most often there is no such cell */
+    for (i32 k = 0; k <= last; k++)
+        is_missed |= kind[k] & GROUND ? 0 : may[k] & MAY_BE_REACHED;
+    if (!is_missed)
+        return;
+    for (i32 step = 1; step <= last; step += last - 1)
+        for (i32 i = 0, k = 0; i < 2 * g->sectors; i++) { /* twice around: it may begin anywhere */
+            i32 from = k;
+            k = (k + step) & last;
+            if (!(may[from] & REACHED) || !(may[k] & MAY_BE_REACHED))
+                continue;
+            float max_rise_m = range_of(lowest[k], (float)ring, g->ring_step) * g->max_rise_beside + g->noise_m;
+            if (magnitude(lowest[k] - lowest[from]) < max_rise_m) {
+                may[k] |= REACHED;
+                kind[k] |= GROUND;
+                sure[k] = lowest[k];
+            }
+        }
 }
 
 /* The second half of Rays.advance: what becomes of cells by `beside`, the sure ground from the ray before the first
@@ -340,6 +367,8 @@ static void trace(const Ground *g, float height_m, const GroundScratch *s)
         float (*behind)[2] = ring + 1 < g->rings ? s->ends + row + sectors : s->ends + row;
         follow_rays(g, ring, s->ends + row, behind, s->lowest + row, kind, height, range, slope, rise_range_m, sure,
                     s->may, s->surface + row, s->range_before + row);
+        if (ring < g->near_rings)
+            reach_along(g, ring, s->lowest + row, s->may, sure, kind);
         close_round(sure, sizeof *sure, sectors * sizeof *sure, beside);
         join_rays(g, ring, beside, s->may, s->lowest + row, kind, height, range, slope);
         close_round(kind, flank, sectors, round);
@@ -399,8 +428,8 @@ static void median_across(i32 sectors, i32 step, const float *row, float *restri
     }
 }
 
-/* The end of GroundEstimator.heights: medians across the rays, the ground beside what stands or lies on it, and
- * _below_what_stands. */
+/* The end of GroundEstimator.heights: medians across the rays, the ground beside what stands on it,
+ * _leave_low_things and _below_what_stands. */
 static void smooth(const Ground *g, const GroundScratch *s, const float *top)
 {
     i32 sectors = g->sectors, cells = g->rings * sectors;

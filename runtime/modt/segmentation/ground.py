@@ -83,11 +83,12 @@ class GroundEstimator:
     where something stands in the cell, since it may be a flank or a bumper. Far away, and on a ray that has met no
     ground yet, what stands in the next ring counts as well. On such a ray the ground may not rise either unless it
     goes on behind: where the next `rings_behind` rings have no return, or one that lies lower again, the cell may be
-    the side or the top of something low. Beyond `low_range_m` the ground of such a ray does not rise at all. The
-    ground may fall by `max_slope_deg` more over any gap, since only ground lies lower. A ray that has lost the ground
-    finds it again in a cell where nothing stands, if that is as high as ground on a ray beside it. The surface is
-    linear between the ground returns of a ray; beyond its last one, the ground is level, but a ramp goes on for
-    `max_gap_m`.
+    the side or the top of something low. Beyond `low_range_m` the ground of such a ray does not rise at all. Where
+    ground goes on behind, it is also reached from known ground along the ring, from cell to cell: the sides of a
+    valley. Known ground is level with the robot, or on a ray that has met ground before. The ground may fall by
+    `max_slope_deg` more over any gap, since only ground lies lower. A ray that has lost the ground finds it again in
+    a cell where nothing stands, if that is as high as ground on a ray beside it. The surface is linear between the
+    ground returns of a ray; beyond its last one, the ground is level, but a ramp goes on for `max_gap_m`.
 
     Behind a crest or an edge, the foot of what stands there is hidden. Where something stands more than `near_m` from
     the last ground, and the lowest return of its cell is below the line of the ray, the ground is taken to be
@@ -156,11 +157,7 @@ class GroundEstimator:
         beside = _median_across(surface, self.tuning.flank_sectors)
         flank = surface - beside > self.tuning.flank_m
         np.copyto(surface, beside, where=np.where(is_ramp, surface < beside, flank))
-        # So is the ground under low things, which seem a rise of it.
-        for ring, sectors in enumerate(self.low_sectors):
-            beside = _median_across(surface[[ring]], sectors)[0]
-            raised = (surface[ring] - beside > self.tuning.low_m) & ~is_ramp[ring]
-            np.copyto(surface[ring], beside, where=raised)
+        self._leave_low_things(surface, is_ramp)
         inner_m, outer_m = self._below_what_stands(surface, rays.lowest, rays.stands)
         clear_m[highest - inner_m <= clear_m] = np.inf
         clear_m[self.near_rings :] = np.inf
@@ -170,6 +167,13 @@ class GroundEstimator:
         share = points.sqrt_range * np.float32(self.grid.rings_per_unit) - ring_of_point
         height: Float32 = points.z - (inner + (outer - inner) * share)
         return height, clear_m.ravel().take(cell), highest
+
+    def _leave_low_things(self, surface: Float32, is_ramp: Bool) -> None:
+        """Lower the (rings, SECTORS) surface under low things, which seem a rise of it, to that beside them."""
+        for ring, sectors in enumerate(self.low_sectors):
+            beside = _median_across(surface[[ring]], sectors)[0]
+            raised = (surface[ring] - beside > self.tuning.low_m) & ~is_ramp[ring]
+            np.copyto(surface[ring], beside, where=raised)
 
     def _below_what_stands(self, surface: Float32, lowest: Float32, stands: Bool) -> tuple[Float32, Float32]:
         """(rings, SECTORS) surface at the inner and at the outer edge of each cell [m].
@@ -256,7 +260,7 @@ class GroundEstimator:
             behind = min(ring + 1, self.grid.rings - 1)
             flat = top[ring] - lowest[ring] <= flat_m
             flat_behind = top[behind] - lowest[ring] <= flat_m
-            rays.advance(ring, range_m[ring], flat, flat_behind & goes_on[ring])
+            rays.advance(ring, range_m[ring], flat, flat_behind, goes_on[ring])
         return rays
 
     def _lowest_behind(self, lowest: Float32) -> Float32:
@@ -326,15 +330,15 @@ class Rays:
         """(SECTORS,) slope at the last ground cell of each ray that ends on a ramp, else 0."""
         return self.slope * self.on_ramp
 
-    def advance(self, ring: int, range_m: Float32, flat: Bool, may_start: Bool) -> None:
+    def advance(self, ring: int, range_m: Float32, flat: Bool, flat_behind: Bool, goes_on: Bool) -> None:
         """Find the rays that have ground in the next ring.
 
         Args:
             ring: that ring.
             range_m: (SECTORS,) range of the lowest returns [m].
             flat: (SECTORS,) cells in which nothing stands: the ground does not rise in the others.
-            may_start: (SECTORS,) cells where a ray without ground may rise: nothing stands in the next ring, and the
-                ground goes on.
+            flat_behind: (SECTORS,) cells behind which nothing stands in the next ring.
+            goes_on: (SECTORS,) cells behind which there are returns, none of them lower.
         """
         tuning = self.ground.tuning
         lowest = self.lowest[ring]  # a view: writes go to self.lowest, but keep the positions, and so range_m
@@ -344,30 +348,49 @@ class Rays:
         residual = lowest - self.height_m - self.slope * np.minimum(gap, tuning.max_gap_m)
         # It continues its own ray. Before a ray has met any ground, a rise has to go on behind as well.
         rise_range_m = np.where(self.beside_ramp, np.float32(tuning.max_gap_m), np.float32(tuning.near_m))
-        may_rise = flat & (may_start | (self.range_m > 0))
+        may_rise = flat & ((flat_behind & goes_on) | (self.range_m > 0))
         found: Bool = residual < np.minimum(gap, rise_range_m) * max_slope * may_rise + tuning.noise_m
         may_fall = residual > -(gap * max_slope + tuning.noise_m)
         found &= may_fall
         # Or it continues the ground of a ray beside it. Only ground that is sure itself can be continued.
         below = residual < -tuning.noise_m
-        beside = self._continues_beside(lowest, range_m, found & (flat | ~below))
-        found |= beside & flat & (residual < gap * self.ground.hill_slope)
+        sure = found & (flat | ~below)
+        may_join = flat & (residual < gap * self.ground.hill_slope)
+        # Ground that goes on behind is reached along the ring, but not from a ray that begins with a rise.
+        known = sure & ((self.range_m > 0) | (residual < tuning.noise_m))
+        sure |= self._reached(lowest, range_m, known, may_join & goes_on)
+        beside = self._continues_beside(lowest, range_m, sure)
+        found |= sure | (beside & may_join)
         # Or it is the lowest visible part of something whose foot a crest hides. Then the ground is still lower.
         stands = ~flat & may_fall
         hidden = ~beside & stands & below & (gap > tuning.near_m)
         np.copyto(lowest, _lowered(lowest, tuning.hidden_m), where=hidden)
+        self._follow(lowest, range_m, found)
+        self._keep(ring, found, stands)
+
+    def _follow(self, lowest: Float32, range_m: Float32, found: Bool) -> None:
+        """Move the last ground cells of the rays to those found in a ring."""
+        gap = range_m - self.range_m
         # The running slope is a mean in which each stretch counts by its length.
         rise = lowest - self.height_m
-        slope = self.slope + (rise - self.slope * gap) / (gap + np.float32(tuning.slope_length_m))
+        slope = self.slope + (rise - self.slope * gap) / (gap + np.float32(self.ground.tuning.slope_length_m))
         steepest = self.ground.hill_slope
         np.copyto(self.slope, np.minimum(np.maximum(slope, -steepest), steepest), where=found)
         np.copyto(self.height_m, lowest, where=found)
         np.copyto(self.range_m, range_m, where=found)
-        self._keep(ring, found, stands)
 
-    def _continues_beside(self, lowest: Float32, range_m: Float32, is_ground: Bool) -> Bool:
+    def _reached(self, lowest: Float32, range_m: Float32, is_ground: Bool, may_be_reached: Bool) -> Bool:
+        """(SECTORS,) ground of a ring, and the cells that it reaches along the ring, from cell to cell."""
+        while True:
+            more = self._continues_beside(lowest, range_m, is_ground, self.ground.tuning.noise_m)
+            more &= may_be_reached & ~is_ground
+            if not more.any():
+                return is_ground
+            is_ground = is_ground | more
+
+    def _continues_beside(self, lowest: Float32, range_m: Float32, is_ground: Bool, noise_m: float = 0.0) -> Bool:
         """(SECTORS,) lowest returns of a ring that continue the ground of the same ring on a ray beside theirs."""
-        max_rise_m = range_m * np.float32(self.ground.max_rise_beside)
+        max_rise_m = range_m * np.float32(self.ground.max_rise_beside) + np.float32(noise_m)
         ground = np.where(is_ground, lowest, np.float32(np.nan))
         left, right = (np.abs(lowest - np.roll(ground, step)) < max_rise_m for step in (1, -1))
         return np.asarray(left | right)
