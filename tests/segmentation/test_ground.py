@@ -8,6 +8,8 @@ from modt.geometry import pseudo_angle
 from modt.segmentation.grids import SECTORS, PointColumns
 from modt.segmentation.ground import GroundEstimator, HeightEstimator
 from modt.segmentation.tuning import SegmentationTuning
+from modt.types import NONE
+from modt_simulation.synthetic_stream import SyntheticStream
 from tests.segmentation import reference, scans
 
 HEIGHT_M = 1.73
@@ -200,6 +202,15 @@ def test_the_sides_of_a_valley_are_ground(elevation, height_m, bend):
     points = on_floor(lambda x, y: 0.5 * bend * x**2 - height_m + 0.0 * y, elevation=elevation)
     near = points[np.hypot(points[:, 0], points[:, 1]) < 4.5]
     assert (np.abs(heights(near, ground(height_m=height_m, min_range_m=0.4), height_m)) < 0.2).mean() > 0.99
+
+
+def test_a_crest_is_no_low_thing():
+    """A wheeled robot with a low sensor on rolling ground, whose crests fall to both sides."""
+    frame, truth = SyntheticStream("hills", "mid-360", 4.0, 2400, height_m=0.3).simulator.sweep(0)
+    is_near = (truth.instance == NONE) & (np.hypot(*frame.points[:, :2].T) < 5.0)
+    height = heights(frame.points, ground(height_m=0.3, min_range_m=0.4), 0.3)[is_near]
+    assert len(height) > 1000
+    assert (height < 0.1).mean() > 0.96
 
 
 def with_person(profile, x, floor_z, elevation=scans.VLP_16):

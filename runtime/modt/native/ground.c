@@ -433,7 +433,8 @@ static void median_across(i32 sectors, i32 step, const float *row, float *restri
 static void smooth(const Ground *g, const GroundScratch *s, const float *top)
 {
     i32 sectors = g->sectors, cells = g->rings * sectors;
-    float *median = s->rays, *beside = median + sectors, *round = beside + sectors; /* the last has two rows */
+    float *median = s->rays, *beside = median + sectors, *beyond = beside + sectors;
+    float *round = beyond + sectors; /* two rows */
     /* From the last ring inwards: the outer edge of a ring is the inner edge of the one after it, smoothed already. */
     for (i32 row = cells - sectors; row >= 0; row -= sectors) {
         float *surface = s->surface + row;
@@ -445,9 +446,12 @@ static void smooth(const Ground *g, const GroundScratch *s, const float *top)
             surface[k] = hidden ? beside[k] : median[k];
         }
         if (row < g->near_rings * sectors) {
-            median_across(sectors, g->low_sectors[row / sectors], surface, round, beside);
+            i32 low_sectors = g->low_sectors[row / sectors], quarter = sectors / 4;
+            median_across(sectors, low_sectors, surface, round, beside);
+            median_across(sectors, 2 * low_sectors < quarter ? 2 * low_sectors : quarter, surface, round, beyond);
             for (i32 k = 0; k < sectors; k++) {
-                int raised = surface[k] - beside[k] > g->low_m && !(s->kind[row + k] & RAMP);
+                float fall_m = minf(maxf(beside[k] - beyond[k], 0.0f), g->low_m);
+                int raised = surface[k] - beside[k] > g->low_m + fall_m && !(s->kind[row + k] & RAMP);
                 surface[k] = raised ? beside[k] : surface[k];
             }
         }

@@ -169,10 +169,15 @@ class GroundEstimator:
         return height, clear_m.ravel().take(cell), highest
 
     def _leave_low_things(self, surface: Float32, is_ramp: Bool) -> None:
-        """Lower the (rings, SECTORS) surface under low things, which seem a rise of it, to that beside them."""
+        """Lower the (rings, SECTORS) surface under low things, which seem a rise of it, to that beside them.
+
+        A crest is a rise as well, but the ground falls farther beyond the ground beside it.
+        """
         for ring, sectors in enumerate(self.low_sectors):
-            beside = _median_across(surface[[ring]], sectors)[0]
-            raised = (surface[ring] - beside > self.tuning.low_m) & ~is_ramp[ring]
+            steps = sectors, min(2 * sectors, SECTORS // 4)
+            beside, beyond = (_median_across(surface[[ring]], step)[0] for step in steps)
+            fall_m = np.clip(beside - beyond, 0, self.tuning.low_m)
+            raised = (surface[ring] - beside > self.tuning.low_m + fall_m) & ~is_ramp[ring]
             np.copyto(surface[ring], beside, where=raised)
 
     def _below_what_stands(self, surface: Float32, lowest: Float32, stands: Bool) -> tuple[Float32, Float32]:
