@@ -40,7 +40,6 @@ from modt_training.dataset import (
     SYNTHETIC,
     Dataset,
     Sensors,
-    crop_features,
     dataset_features,
     draw_batch,
     sampling_pools,
@@ -246,8 +245,9 @@ class Model:
 
     def posterior(self, data: Dataset) -> Float64:
         """(R, C) posteriors by network and box together, of the crops of a data set, without augmentation."""
-        network = self.posterior_of_points(data, np.arange(len(data)))
-        log_box = box_classifier.logits(self.boxes.layers, crop_features(data.crops, data.sensors))
+        rows = np.arange(len(data))
+        network = self.posterior_of_points(data, rows)
+        log_box = box_classifier.logits(self.boxes.layers, dataset_features(data, rows))
         none = np.zeros_like(log_box)
         pool = log_pool(network, log_box, none, self.log_frequency, self.boxes.weights)
         return np.asarray(softmax(pool, axis=1), np.float64)
