@@ -13,7 +13,7 @@ from modt import profile
 from modt.app import assembly
 from modt.classification.pointnet import PointNet
 from modt.classification.scheduler import Scheduler, Selection
-from modt.classification.tuning import BatchingTuning
+from modt.classification.tuning import ClassificationTuning
 from modt.config import ClassificationConfig, ProfileConfig, SensorConfig, TrackingConfig
 from modt.energy.ledger import Ledger, LedgerLine
 from modt.geometry import FieldOfView
@@ -82,8 +82,8 @@ def config(sensor: str, association: str) -> ProfileConfig:
 
 
 @cache
-def _network(config: ClassificationConfig, sensor: SensorConfig, batching: BatchingTuning) -> PointNet:
-    return PointNet(ModelFile.find(config.model), config, sensor, batching)
+def _network(config: ClassificationConfig, sensor: SensorConfig, tuning: ClassificationTuning) -> PointNet:
+    return PointNet(ModelFile.find(config.model), config, sensor, tuning)
 
 
 def _warm_up(classify: Any, cost: Any, *_: Any) -> None:

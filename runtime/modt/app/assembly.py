@@ -18,7 +18,7 @@ from modt.classification.pointnet import PointNet
 from modt.classification.prior import Prior, make_prior
 from modt.classification.product_fusion import AnyView, KeyViews
 from modt.classification.scheduler import Scheduler
-from modt.classification.tuning import BatchingTuning, FusionTuning
+from modt.classification.tuning import ClassificationTuning, FusionTuning
 from modt.config import (
     KERNELS,
     NATIVE,
@@ -189,7 +189,7 @@ def sensor_profile(mounted: MountedSensor) -> ProfileConfig:
 
 
 def network(
-    config: ClassificationConfig, sensor: SensorConfig, tuning: BatchingTuning = BatchingTuning()
+    config: ClassificationConfig, sensor: SensorConfig, tuning: ClassificationTuning = ClassificationTuning()
 ) -> PointNet:
     """The classifier with the model that the configuration names.
 
@@ -237,10 +237,11 @@ def pipeline(
     host.keep_freed_pages()
     kernels = chosen_kernels(profile.segmentation.kernels, tuning.shape)
     limits = profile.classification
-    batching = tuning.classification.batching
-    model = network(limits, profile.sensor, batching)
+    model = network(limits, profile.sensor, tuning.classification)
     classifier = substitute(model)
-    cost = LinearCost(limits.max_points, padded_size(limits, batching), tuning.classification.call_cost)
+    cost = LinearCost(
+        limits.max_points, padded_size(limits, tuning.classification.batching), tuning.classification.call_cost
+    )
     warm_up(classifier.classify, cost, limits.max_points, limits.batch, time.thread_time_ns)
     _check_budget(mode.budget(profile), cost, profile)
     return stages(

@@ -7,13 +7,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from modt.classes import N_CLASSES
+from modt.classes import N_CLASSES, ObjectClass
 from modt.classification import box_classifier, reflectance_classifier
-from modt.classification.crops import batches, canonical, gather, ground_z_m
+from modt.classification.body import bodies, may_hold_more
+from modt.classification.crops import Crops, batches, canonical, gather, ground_z_m
 from modt.classification.network import Network
 from modt.classification.pool import log_pool, softmax
 from modt.classification.prior import BoxScores
-from modt.classification.tuning import BatchingTuning
+from modt.classification.tuning import ClassificationTuning
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
 from modt.model_file import ModelFile
@@ -55,13 +56,13 @@ class PointNet:
         model: ModelFile,
         config: ClassificationConfig,
         sensor: SensorConfig,
-        tuning: BatchingTuning = BatchingTuning(),
+        tuning: ClassificationTuning = ClassificationTuning(),
     ) -> None:
         self.model = model
         self.network = Network(model)
         self._config = config
         self._sensor = sensor
-        self._max_padding_points = tuning.max_padding_points
+        self._tuning = tuning
         metadata = self.network.metadata
         pooled = metadata if config.likelihood == "pooled" else {}
         try:
@@ -86,15 +87,41 @@ class PointNet:
             which: (R,) proposals to classify.
         """
         gathered = gather(proposals, which, self._config.max_points)
-        crops = canonical(gathered, ground_z_m(proposals, which, self._sensor))
-        count = crops.count
-        by_size = count.argsort(kind="stable")
+        ground = ground_z_m(proposals, which, self._sensor)
+        crops = canonical(gathered, ground)
         probability = np.empty((len(crops), N_CLASSES))
-        for network, crops_of_network in self._divided(proposals, which, by_size):
-            for batch in batches(count[crops_of_network].tolist(), self._config.batch, self._max_padding_points):
-                rows = crops_of_network[batch]
-                probability[rows] = network.infer(crops.padded(rows, self._config.min_points))
+        for network, rows in self._divided(proposals, which, crops.count.argsort(kind="stable")):
+            self._infer(network, crops, rows, probability)
+        if self.box_scores.informative:
+            self._look_again(gathered, ground, proposals.box[which], probability)
         return self._pooled(probability, proposals, which)
+
+    def _infer(self, network: Network, crops: Crops, rows: Int, probability: Float64) -> None:
+        """Write the class probabilities of crops into their rows of (R, C); (K,) rows of ascending size."""
+        for batch in batches(
+            crops.count[rows].tolist(), self._config.batch, self._tuning.batching.max_padding_points
+        ):
+            probability[rows[batch]] = network.infer(crops.padded(rows[batch], self._config.min_points))
+
+    def _look_again(self, crops: Crops, ground_z_m: Float64, box: Float64, probability: Float64) -> None:
+        """Let the body of a person count where all points together are background.
+
+        Args:
+            crops: points of R proposals in the sensor frame.
+            ground_z_m: (R,) z of the ground beneath each [m].
+            box: (R, 7) boxes.
+            probability: (R, C) of all points; of the body from here on, where that shows a person.
+        """
+        tuning = self._tuning.body
+        may = may_hold_more(box, ground_z_m, tuning) & (probability[:, ObjectClass.BACKGROUND] > 0.5)
+        rows, found = bodies(crops, ground_z_m, may.nonzero()[0], tuning)
+        if not len(rows):
+            return
+        of_body = np.empty((len(rows), N_CLASSES))
+        found = canonical(found, ground_z_m[rows])
+        self._infer(self.network, found, found.count.argsort(kind="stable"), of_body)
+        is_person = of_body[:, ObjectClass.PEDESTRIAN] > tuning.min_person
+        probability[rows[is_person]] = of_body[is_person]
 
     def _divided(self, proposals: Proposals, which: Int, crops: Int) -> list[tuple[Network, Int]]:
         """Each network with its part of the crops, in their order: (R,) indices into (R,) proposals."""

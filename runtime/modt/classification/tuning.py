@@ -21,6 +21,39 @@ class BatchingTuning:
 
 
 @dataclass(frozen=True)
+class BodyTuning:
+    """Second look at the body of a person in what the network takes for background.
+
+    Chosen on: simulated people with loads, with a check on simulated streets and on KITTI scans.
+    """
+
+    radius_m: float = 0.3
+    """Radius of a body [m]. With more, it holds more of loads."""
+    top_m: float = 1.75
+    """Height of the top of a body above the ground [m]. With more, it holds more of what hangs above people."""
+    min_leg_m: float = 0.2
+    """Height from which the middle of the points is that of the body [m]."""
+    max_leg_m: float = 1.0
+    """Height up to which the middle of the points is that of the body [m]. With more, loads move it."""
+    min_share: float = 0.4
+    """Least share of the points that are in the body. With less, parts of bushes are looked at."""
+    min_points: int = 12
+    """Points below which a body is not looked at. With less, poles are people."""
+    min_height_m: float = 1.2
+    """Least height of what is seen of a body [m]. With less, parts of bushes are looked at."""
+    min_person: float = 0.7
+    """Probability of a person from which the body counts in place of the whole. With less, trunks are people."""
+    usual_length_m: float = 0.8
+    """Length of a proposal up to which it is no more than a person [m]."""
+    usual_top_m: float = 1.95
+    """Height of the top above the ground up to which a proposal is no more than a person [m]."""
+    max_length_m: float = 3.5
+    """Length from which a proposal is no person with a load [m]."""
+    max_top_m: float = 3.0
+    """Height of the top above the ground from which a proposal is no person with a load [m]."""
+
+
+@dataclass(frozen=True)
 class MotionTuning:
     """Likelihood of the classes by motion and size, besides the table counted on simulated drives."""
 
@@ -340,6 +373,7 @@ class ClassificationTuning:
     """All chosen values of the stage, one part a mechanism."""
 
     batching: BatchingTuning = BatchingTuning()
+    body: BodyTuning = BodyTuning()
     fusion: FusionTuning = FusionTuning()
     decision: DecisionTuning = DecisionTuning()
     worth: WorthTuning = WorthTuning()
