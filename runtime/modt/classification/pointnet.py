@@ -114,9 +114,9 @@ class PointNet:
         """
         tuning = self._tuning.body
         may = may_hold_more(box, ground_z_m, tuning) & (probability[:, ObjectClass.BACKGROUND] > 0.5)
-        rows, found = bodies(crops, ground_z_m, may.nonzero()[0], tuning)
-        if not len(rows):
+        if not may.any():
             return
+        rows, found = bodies(crops, ground_z_m, may.nonzero()[0], tuning)
         of_body = np.empty((len(rows), N_CLASSES))
         found = canonical(found, ground_z_m[rows])
         self._infer(self.network, found, found.count.argsort(kind="stable"), of_body)
