@@ -86,11 +86,12 @@ def robosense_packets(folder):
 @target()
 def robosense_difop(folder):
     model = WRITTEN["airy"]
+    timed = model.turns(1.2)[::8]
 
     def call(raw):
         decoder = RobosenseDecoder("sensor")
         decoder.describe(raw)
-        for at_s, payload in model.turns(1.2)[::8]:
+        for at_s, payload in timed:
             decoder.decode(at_s, payload)
             decoder.describe(raw)
         decoder.finish()
