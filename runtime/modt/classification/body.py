@@ -54,9 +54,8 @@ def bodies(crops: Crops, ground_z_m: Float64, rows: Int, tuning: BodyTuning) -> 
     high_m = np.full(len(rows), -np.inf)
     np.minimum.at(low_m, owner[inside], height_m[inside])
     np.maximum.at(high_m, owner[inside], height_m[inside])
-    shown = (n_inside >= np.maximum(tuning.min_points, tuning.min_share * count)) & (
-        high_m - low_m > tuning.min_height_m
-    )
+    shown = n_inside >= np.maximum(tuning.min_points, tuning.min_share * count)
+    shown &= high_m - low_m > tuning.min_height_m
     offsets = np.append(0, n_inside[shown].cumsum())
     return rows[shown], Crops(xyz[inside[shown[owner[inside]]]], offsets)
 

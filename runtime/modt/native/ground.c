@@ -292,6 +292,7 @@ static void reach_along(const Ground *g, i32 ring, const float *lowest, uint8_t 
         is_missed |= kind[k] & GROUND ? 0 : may[k] & MAY_BE_REACHED;
     if (!is_missed)
         return;
+    /* Forwards, then backwards: `last` cells ahead around the ring is one back. */
     for (i32 step = 1; step <= last; step += last - 1)
         for (i32 i = 0, k = 0; i < 2 * g->sectors; i++) { /* twice around: it may begin anywhere */
             i32 from = k;

@@ -327,9 +327,8 @@ class CellClusterer:
         n_cells = np.bincount(part[part != NONE], minlength=len(parts))
         n_below = np.bincount(part[below], minlength=len(parts))
         leaves = self._may_be_person(parts, self.split.person) & (parts.points >= tuning.min_points)
-        leaves &= (parts.top_m < np.float32(tuning.max_person_m)) & (
-            parts.bottom_m < np.float32(self.structure.max_bottom_m)
-        )
+        leaves &= parts.top_m < np.float32(tuning.max_person_m)
+        leaves &= parts.bottom_m < np.float32(self.structure.max_bottom_m)
         leaves &= n_below >= tuning.min_share * n_cells
         return leaves
 
