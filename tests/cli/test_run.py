@@ -233,15 +233,17 @@ def test_a_power_limit_is_kept_and_named_an_estimate_where_it_is_one(start, tmp_
     for _ in range(60):  # the first window of energy ends after a second or more, however busy the machine is
         service.hear("STATUS=")
         status = json.loads(path.read_text()) if path.exists() else None
-        if status and "deferred" in status["loop"]["steps_entered"]:  # the board idles at 3 W
+        if status and status["power"]["windows"] and "deferred" in status["loop"]["steps_entered"]:
             break
     else:
         pytest.fail("no classification was deferred")
     code, said = service.end()
     assert code == 0, said
+    assert status["power"]["watts"] > status["power"]["limit_W"]  # the board idles at 3 W
     if status["power"]["kind"] == "estimated":
         assert "loop.power_W is kept by the model" in said
-    assert "more power than the limit" in said
+    if "(the result came after its deadline)" not in said:  # a busy machine may have shed load by time before
+        assert "(more power than the limit)" in said
 
 
 @pytest.mark.parametrize(("out", "cause"), [("file/run", "Not a directory"), ("others", "holds lost+found")])
