@@ -104,6 +104,7 @@ def test_lines_go_once_to_every_sink_asked_for_and_a_second_run_is_the_same_byte
         (["--rate", "0"], ["--rate"]),
         (["scans", "--fov", "camera"], ["no calibration", "--fov full"]),
         (["--out", "foreign"], ["foreign", "no record"]),
+        (["scans", "foreign"], ["foreign", "modt batch"]),
     ],
 )
 def test_misuse_is_one_line_and_status_2(tmp_path, monkeypatch, capsys, arguments, words):

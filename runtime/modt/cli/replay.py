@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from modt import host
 from modt.cli import options
 from modt.cli.command import INTERRUPTED
+from modt.errors import MisuseError
 
 if TYPE_CHECKING:
     from modt.app.loop import Loop
@@ -23,6 +24,7 @@ def add_parser(commands: options.Commands) -> None:
     """Declare the command and its options."""
     p = commands.add_parser("replay", help="process a recorded stream, or the built-in synthetic one")
     options.add_stream_options(p)
+    p.add_argument("others", nargs="*", type=Path, help=argparse.SUPPRESS)
     options.add(p, "fov")
     options.add(p, "out", default=None, help="run directory (default: runs/STREAM-MODE)")
     options.add(p, "mode")
@@ -53,6 +55,9 @@ def run(arguments: argparse.Namespace) -> int:
 
     SIGTERM ends it with this status, SIGINT with 130, both with complete records.
     """
+    if arguments.others:
+        remedy = "replay them one by one, or as one dataset by modt batch"
+        raise MisuseError(arguments.others[0], "modt replay takes one recording", remedy)
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
     from modt.app.build import replay
