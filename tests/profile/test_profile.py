@@ -7,7 +7,7 @@ import pytest
 from modt import assets, profile
 from modt.config import EnergyConfig, ProfileConfig, SchedulerConfig
 from modt.errors import MisuseError
-from modt.segmentation.cells import CellClusterer
+from modt.segmentation.cell_clusterer import CellClusterer
 from modt_commands import profile_group
 
 

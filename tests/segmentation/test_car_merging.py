@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.segmentation.cells import ClusterSizes
+from modt.segmentation.cluster_sizes import ClusterSizes
 from modt.segmentation.clustering import Clusterer
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.groups import Groups

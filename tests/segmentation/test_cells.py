@@ -4,7 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.segmentation.cells import ClusterSizes, connect, moved, occupied_cells
+from modt.segmentation.cells import connect, occupied_cells
+from modt.segmentation.cluster_sizes import ClusterSizes, moved
 from modt.segmentation.clustering import Clusterer
 from modt.segmentation.grids import PointColumns, SqrtRangeGrid
 from modt.segmentation.tuning import SegmentationTuning

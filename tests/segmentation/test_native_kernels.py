@@ -20,7 +20,9 @@ from modt.native import build
 from modt.native.library import NotAvailableError, load
 from modt.observations import observe
 from modt.odometry.pose_estimator import PoseEstimator
-from modt.segmentation.cells import AirOfCells, CellClusterer, Clusters
+from modt.segmentation.cell_clusterer import CellClusterer
+from modt.segmentation.cells import AirOfCells
+from modt.segmentation.clusters import Clusters
 from modt.segmentation.grids import FAR_M, PointColumns, SqrtRangeGrid
 from modt.segmentation.groups import Groups, consecutive
 from modt.segmentation.kernels import NUMPY, Kernels

@@ -8,12 +8,16 @@ from dataclasses import replace
 import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.segmentation.cells import CellClusterer, Cells, Clusters, ClusterSizes, moved, set_apart
+from modt.segmentation.cell_clusterer import CellClusterer
+from modt.segmentation.cells import Cells
+from modt.segmentation.cluster_sizes import ClusterSizes, moved
+from modt.segmentation.clusters import Clusters
 from modt.segmentation.gaps import NO_GAPS, unseen_m
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.groups import consecutive, label_max
 from modt.segmentation.kernels import NUMPY, Kernels
 from modt.segmentation.porosity import PorosityFinder
+from modt.segmentation.set_apart import set_apart
 from modt.segmentation.strips import ELEVATION
 from modt.segmentation.tuning import SegmentationTuning
 from modt.types import NONE, Bool, Float32, Int, Int8, PointKind

@@ -7,11 +7,14 @@ from typing import NamedTuple
 import numpy as np
 
 from modt.geometry.kernels import GeometryKernels
-from modt.segmentation.cells import CellClusterer, low_points, members_of, occupied_cells
+from modt.segmentation.cell_clusterer import CellClusterer
+from modt.segmentation.cells import occupied_cells
+from modt.segmentation.clusters import members_of
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.ground import GroundEstimator
 from modt.segmentation.groups import Groups, best_headings, reflectance_statistics
 from modt.segmentation.heads import find_people
+from modt.segmentation.low_points import low_points
 from modt.segmentation.porosity import PorosityFinder, mean_solidity
 from modt.segmentation.strips import merge_strips, view_bounds
 from modt.types import Bool, Float32, Int, Int8, PointKind

@@ -11,7 +11,10 @@ import math
 import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.segmentation.cells import AirOfCells, CellClusterer, Clusters, ClusterSizes
+from modt.segmentation.cell_clusterer import CellClusterer
+from modt.segmentation.cells import AirOfCells
+from modt.segmentation.cluster_sizes import ClusterSizes
+from modt.segmentation.clusters import Clusters
 from modt.segmentation.groups import consecutive
 from modt.segmentation.kernels import Above, Kernels
 from modt.segmentation.tuning import CellTuning, LowTuning, SplitTuning

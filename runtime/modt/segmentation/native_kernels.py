@@ -15,7 +15,10 @@ from modt.geometry.native_kernels import NativeGeometryKernels
 from modt.geometry.tuning import ShapeTuning
 from modt.native.declarations import declare, structure
 from modt.native.library import Filled, Layout
-from modt.segmentation.cells import AirOfCells, CellClusterer, Cells, Clusters, ClusterSizes, Members
+from modt.segmentation.cell_clusterer import CellClusterer
+from modt.segmentation.cells import AirOfCells, Cells
+from modt.segmentation.cluster_sizes import ClusterSizes
+from modt.segmentation.clusters import Clusters, Members
 from modt.segmentation.grids import FAR_M, SECTORS, PointColumns, SqrtRangeGrid
 from modt.segmentation.ground import QUARTERS, GroundEstimator
 from modt.segmentation.groups import AXES, BRIGHT, DARK, HEADINGS, Groups

@@ -8,7 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from modt.config import SensorConfig
-from modt.segmentation.cells import AirOfCells, Cells, Clusters
+from modt.segmentation.cells import AirOfCells, Cells
+from modt.segmentation.clusters import Clusters
 from modt.segmentation.grids import FAR_M, SqrtRangeGrid
 from modt.segmentation.groups import Groups
 from modt.segmentation.tuning import PorosityTuning

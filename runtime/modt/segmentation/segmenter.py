@@ -9,8 +9,8 @@ import numpy as np
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
 from modt.segmentation.ceiling import CeilingFinder
-from modt.segmentation.cells import Clusters, Members
 from modt.segmentation.clustering import Clusterer
+from modt.segmentation.clusters import Clusters, Members
 from modt.segmentation.gaps import gaps_of
 from modt.segmentation.ground import GroundEstimator, HeightEstimator
 from modt.segmentation.groups import HEADINGS, has_reflectance

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from modt.geometry import pseudo_angle
-from modt.segmentation.cells import Clusters
+from modt.segmentation.clusters import Clusters
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.groups import Groups
 from modt.segmentation.tuning import StripTuning
