@@ -38,26 +38,37 @@ def bodies(crops: Crops, ground_z_m: Float64, rows: Int, tuning: BodyTuning) -> 
         rows: (K,) proposals to look at.
         tuning: size of a body, and how much of it has to be shown.
     """
-    count = crops.count[rows]
-    owner = np.arange(len(rows)).repeat(count)
-    place_in_crop = np.arange(len(owner)) - (count.cumsum() - count).repeat(count)
-    xyz = crops.xyz.take(crops.offsets[rows].repeat(count) + place_in_crop, axis=0)
-    height_m = xyz[:, 2] - ground_z_m[rows].repeat(count)
-    legs = np.flatnonzero((height_m > tuning.min_leg_m) & (height_m < tuning.max_leg_m))
+    tried = crops.select(rows)
+    owner = np.arange(len(rows)).repeat(tried.count)
+    height_m = tried.xyz[:, 2] - ground_z_m[rows].repeat(tried.count)
+    aside_m2 = _aside_m2(tried.xyz, height_m, owner, len(rows), tuning)
+    inside = (aside_m2 < tuning.radius_m**2) & (height_m < tuning.top_m)
+    shown = _is_shown(height_m[inside], owner[inside], tried.count, tuning)
+    of_shown = inside & shown[owner]
+    n_points = np.bincount(owner[of_shown], minlength=len(rows))[shown]
+    return rows[shown], Crops(tried.xyz[of_shown], np.append(0, n_points.cumsum()))
+
+
+def _aside_m2(xyz: Float32, height_m: Float64, owner: Int, n: int, tuning: BodyTuning) -> Float64:
+    """(P,) squared distance of each point from the middle of the legs of its owner [m²], NaN where none are seen."""
+    leg = np.flatnonzero((height_m > tuning.min_leg_m) & (height_m < tuning.max_leg_m))
     aside_m2 = np.zeros(len(owner))
     for axis in (0, 1):
-        middle_m = _medians(xyz[legs, axis], owner[legs], len(rows))
-        aside_m2 += np.square(xyz[:, axis] - middle_m.repeat(count))
-    inside = np.flatnonzero((aside_m2 < tuning.radius_m**2) & (height_m < tuning.top_m))
-    n_inside = np.bincount(owner[inside], minlength=len(rows))
-    low_m = np.full(len(rows), np.inf)
-    high_m = np.full(len(rows), -np.inf)
-    np.minimum.at(low_m, owner[inside], height_m[inside])
-    np.maximum.at(high_m, owner[inside], height_m[inside])
-    shown = n_inside >= np.maximum(tuning.min_points, tuning.min_share * count)
-    shown &= high_m - low_m > tuning.min_height_m
-    offsets = np.append(0, n_inside[shown].cumsum())
-    return rows[shown], Crops(xyz[inside[shown[owner[inside]]]], offsets)
+        middle_m = _medians(xyz[leg, axis], owner[leg], n)
+        aside_m2 += np.square(xyz[:, axis] - middle_m[owner])
+    return aside_m2
+
+
+def _is_shown(height_m: Float64, owner: Int, n_points: Int, tuning: BodyTuning) -> Bool:
+    """(K,) whether the points inside a body, by their owner, are a person's, of (K,) points of the proposal."""
+    n_inside = np.bincount(owner, minlength=len(n_points))
+    low_m = np.full(len(n_points), np.inf)
+    high_m = np.full(len(n_points), -np.inf)
+    np.minimum.at(low_m, owner, height_m)
+    np.maximum.at(high_m, owner, height_m)
+    is_shown: Bool = n_inside >= np.maximum(tuning.min_points, tuning.min_share * n_points)
+    is_shown &= high_m - low_m > tuning.min_height_m
+    return is_shown
 
 
 def _medians(values: Float32, owner: Int, n: int) -> Float64:

@@ -34,6 +34,13 @@ class Crops:
         """(R,) points of each crop."""
         return self.offsets[1:] - self.offsets[:-1]
 
+    def select(self, rows: Int) -> Crops:
+        """These crops alone."""
+        count = self.count[rows]
+        offsets = np.append(0, count.cumsum())
+        place_in_crop = np.arange(offsets[-1]) - offsets[:-1].repeat(count)
+        return Crops(self.xyz.take(self.offsets[rows].repeat(count) + place_in_crop, axis=0), offsets)
+
     def padded(self, rows: Int, min_points: int = 1) -> Float32:
         """(R, n, 3) crops of these (R,) rows, each padded by its last point to the largest of them or to min_points.
 
