@@ -6,7 +6,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from modt.segmentation.grids import SECTORS
-from modt.segmentation.ground import POSITIONS
+from modt.segmentation.ground_rays import POSITIONS
 from modt.segmentation.groups import HEADINGS
 from modt.segmentation.tuning import SegmentationTuning
 

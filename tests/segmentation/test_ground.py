@@ -6,7 +6,8 @@ from hypothesis import strategies as st
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import pseudo_angle
 from modt.segmentation.grids import SECTORS, PointColumns
-from modt.segmentation.ground import GroundEstimator, HeightEstimator
+from modt.segmentation.ground import GroundEstimator
+from modt.segmentation.sensor_height import HeightEstimator
 from modt.segmentation.tuning import SegmentationTuning
 from modt.types import NONE
 from modt_simulation.synthetic_stream import SyntheticStream

@@ -10,69 +10,13 @@ import numpy as np
 from modt.config import SensorConfig
 from modt.segmentation.gaps import EDGE, FIRST, LAST, NO_GAPS
 from modt.segmentation.grids import SECTORS, PointColumns, PolarGrid
+from modt.segmentation.ground_rays import POSITION_MASK, POSITIONS, Rays, Slopes, position
 from modt.segmentation.groups import label_max, label_min
-from modt.segmentation.tuning import GroundTuning, PolarGridTuning, SensorHeightTuning
+from modt.segmentation.tuning import GroundTuning, PolarGridTuning
 from modt.types import Bool, Float32, Int
 
 QUARTERS = 4
 """Parts of a ring over which the roughness of the ground is measured."""
-POSITIONS = 1024
-"""Positions of a return in its ring that are told apart, a power of two."""
-POSITION_MASK = np.int32(POSITIONS - 1)
-
-
-class HeightEstimator:
-    """Mode of the depths of flat cells around the sensor, median over the first sweeps.
-
-    Cells on walls are excluded, since they are not flat: indoors they outnumber the cells on the floor.
-
-    Args:
-        sensor: range and beam spacing.
-        tuning: which cells are used, and how many are a floor.
-        polar: cells of the polar grid.
-    """
-
-    def __init__(
-        self,
-        sensor: SensorConfig,
-        tuning: SensorHeightTuning = SensorHeightTuning(),
-        polar: PolarGridTuning = PolarGridTuning(),
-    ) -> None:
-        self.tuning = tuning
-        max_range_m = min(tuning.max_range_m, sensor.max_range_m)
-        self.min_sqrt_range = np.sqrt(sensor.min_range_m)
-        self.max_sqrt_range = np.sqrt(max_range_m)
-        self.grid = PolarGrid(max_range_m, polar)
-        self.flat_m = np.repeat(self.grid.flat_m, SECTORS)
-        range_m = np.repeat(self.grid.range_m, SECTORS).astype(np.float64)
-        level_step_rad = float(sensor.beams.step_rad(np.zeros(1, np.float32)).item())
-        self.horizon_m = tuning.horizon_beams * level_step_rad * range_m
-        self.estimates_m: list[float] = []
-
-    def height_m(self, points: Float32) -> float:
-        """Median of the estimates of the first sweeps, this (N, 4) one included; the default before any [m]."""
-        if len(self.estimates_m) < self.tuning.sweeps:
-            estimate = self._estimate(PointColumns.from_array(points))
-            if estimate is not None:
-                self.estimates_m.append(estimate)
-        return float(np.median(self.estimates_m)) if self.estimates_m else self.tuning.default_m
-
-    def _estimate(self, points: PointColumns) -> float | None:
-        """Depth of the floor below the sensor in one sweep [m], None without one."""
-        bin_m = self.tuning.bin_m
-        used = (points.sqrt_range > self.min_sqrt_range) & (points.sqrt_range < self.max_sqrt_range)
-        around = points.take(np.flatnonzero(used))
-        cell = self.grid.cell(around)
-        lowest = label_min(around.z, cell, self.grid.size)
-        highest = label_max(around.z, cell, self.grid.size)
-        flat = (highest - lowest < self.flat_m) & (-lowest > self.horizon_m)
-        depth = -lowest[flat].astype(np.float64)
-        cells = np.bincount((depth / bin_m).astype(np.int64), minlength=1)
-        in_three_bins = np.convolve(cells, np.ones(3, np.int64), mode="same")
-        if in_three_bins.max() < self.tuning.min_cells:
-            return None
-        mode = (int(np.argmax(in_three_bins)) + 0.5) * bin_m
-        return float(depth[np.abs(depth - mode) < 1.5 * bin_m].mean())
 
 
 class GroundEstimator:
@@ -127,10 +71,7 @@ class GroundEstimator:
         sectors = np.rint(tuning.low_half_width_m / (2 * np.pi / SECTORS * near_m))
         self.low_sectors = np.clip(sectors, tuning.flank_sectors, SECTORS // 4).astype(np.int32)
         self.near_rings = len(near_m)
-        steepest_rad = np.deg2rad(max_slope_deg)
-        self.max_slope, self.ramp_slope = np.tan([steepest_rad, tuning.ramp_share * steepest_rad]).tolist()
-        self.max_rise_beside = float(2 * np.pi / SECTORS * self.max_slope)  # from ray to ray, at a range of 1 m
-        self.hill_slope = float(np.tan(2 * steepest_rad))  # of a hill, seen from the slope of the hill opposite
+        self.slopes = Slopes.of(max_slope_deg, tuning)
 
     def height_above(self, points: PointColumns, sensor_height_m: float) -> Float32:
         """(N,) height of each point above the ground [m]."""
@@ -187,7 +128,7 @@ class GroundEstimator:
         to it.
         """
         outer = np.concatenate([surface[1:], surface[-1:]])
-        above_m = surface + (outer - surface) * _position(lowest) - lowest
+        above_m = surface + (outer - surface) * position(lowest) - lowest
         drop_m = np.where(stands & (above_m > self.tuning.noise_m), above_m, np.float32(0))
         return surface - drop_m, outer - drop_m
 
@@ -215,7 +156,7 @@ class GroundEstimator:
         at once: see `range_m`.
         """
         reach = points.sqrt_range * points.sqrt_range
-        reach *= self.hill_slope
+        reach *= self.slopes.hill_slope
         reach += self.tuning.noise_m
         plausible = np.abs(points.z + np.float32(sensor_height_m)) < reach
         plausible &= points.sqrt_range > self.min_sqrt_range
@@ -226,7 +167,7 @@ class GroundEstimator:
 
     def range_m(self, lowest: Float32, ring: Int) -> Float32:
         """(...) range of the lowest returns of cells of rings [m]."""
-        sqrt_range = (ring.astype(np.float32) + _position(lowest)) * np.float32(self.grid.ring_step)
+        sqrt_range = (ring.astype(np.float32) + position(lowest)) * np.float32(self.grid.ring_step)
         range_m: Float32 = sqrt_range * sqrt_range
         return range_m
 
@@ -255,7 +196,7 @@ class GroundEstimator:
 
         All rays advance together, ring by ring, from the foot of the sensor.
         """
-        rays = Rays(self, lowest.copy(), sensor_height_m)
+        rays = Rays(self.slopes, self.tuning, lowest.copy(), sensor_height_m)
         range_m = self.range_m(lowest, np.arange(self.grid.rings)[:, None])
         lowest_behind = self._lowest_behind(lowest)
         # Where ground rises and goes on, what lies behind is not lower than this cell.
@@ -306,121 +247,6 @@ class GroundEstimator:
         between = height_before + (height.take(after) - height_before) * share
         surface: Float32 = np.where(beyond, np.minimum(ramp, np.maximum(lowest, height_before)), between)
         return surface
-
-
-class Rays:
-    """The SECTORS rays as they advance: last ground cell of each, and what was found in the rings passed.
-
-    Attributes:
-        lowest: (rings, SECTORS) height of the ground of each cell in which there is a return, if it is ground [m].
-        is_ground: (rings, SECTORS) cells that are ground.
-        is_ramp: (rings, SECTORS) cells on and beside a ramp, where no surface is a vehicle's side.
-        stands: (rings, SECTORS) cells in which something stands.
-    """
-
-    def __init__(self, ground: GroundEstimator, lowest: Float32, sensor_height_m: float) -> None:
-        self.ground = ground
-        self.lowest = lowest
-        self.is_ground: Bool = np.zeros(lowest.shape, np.bool_)
-        self.is_ramp: Bool = np.zeros(lowest.shape, np.bool_)
-        self.stands: Bool = np.zeros(lowest.shape, np.bool_)
-        self.height_m = np.full(SECTORS, -sensor_height_m, np.float32)
-        self.range_m = np.zeros(SECTORS, np.float32)
-        self.slope = np.zeros(SECTORS, np.float32)  # running mean along the ray
-        self.on_ramp: Bool = np.zeros(SECTORS, np.bool_)
-        self.beside_ramp = self.on_ramp  # or on it
-
-    @property
-    def end_slope(self) -> Float32:
-        """(SECTORS,) slope at the last ground cell of each ray that ends on a ramp, else 0."""
-        return self.slope * self.on_ramp
-
-    def advance(self, ring: int, range_m: Float32, flat: Bool, flat_behind: Bool, goes_on: Bool) -> None:
-        """Find the rays that have ground in the next ring.
-
-        Args:
-            ring: that ring.
-            range_m: (SECTORS,) range of the lowest returns [m].
-            flat: (SECTORS,) cells in which nothing stands: the ground does not rise in the others.
-            flat_behind: (SECTORS,) cells behind which nothing stands in the next ring.
-            goes_on: (SECTORS,) cells behind which there are returns, none of them lower.
-        """
-        tuning = self.ground.tuning
-        lowest = self.lowest[ring]  # a view: writes go to self.lowest, but keep the positions, and so range_m
-        max_slope = self.ground.max_slope
-        # How far each return is from the line that its ray was on, extrapolated no farther than max_gap_m.
-        gap = range_m - self.range_m
-        residual = lowest - self.height_m - self.slope * np.minimum(gap, tuning.max_gap_m)
-        # It continues its own ray. Before a ray has met any ground, a rise has to go on behind as well.
-        rise_range_m = np.where(self.beside_ramp, np.float32(tuning.max_gap_m), np.float32(tuning.near_m))
-        may_rise = flat & ((flat_behind & goes_on) | (self.range_m > 0))
-        found: Bool = residual < np.minimum(gap, rise_range_m) * max_slope * may_rise + tuning.noise_m
-        may_fall = residual > -(gap * max_slope + tuning.noise_m)
-        found &= may_fall
-        # Or it continues the ground of a ray beside it. Only ground that is sure itself can be continued.
-        below = residual < -tuning.noise_m
-        sure = found & (flat | ~below)
-        may_join = flat & (residual < gap * self.ground.hill_slope)
-        # Ground that goes on behind is reached along the ring, but not from a ray that begins with a rise.
-        known = sure & ((self.range_m > 0) | (residual < tuning.noise_m))
-        sure |= self._reached(lowest, range_m, known, may_join & goes_on)
-        beside = self._continues_beside(lowest, range_m, sure)
-        found |= sure | (beside & may_join)
-        # Or it is the lowest visible part of something whose foot a crest hides. Then the ground is still lower.
-        stands = ~flat & may_fall
-        hidden = ~beside & stands & below & (gap > tuning.near_m)
-        np.copyto(lowest, _lowered(lowest, tuning.hidden_m), where=hidden)
-        self._follow(lowest, range_m, found)
-        self._keep(ring, found, stands)
-
-    def _follow(self, lowest: Float32, range_m: Float32, found: Bool) -> None:
-        """Move the last ground cells of the rays to those found in a ring."""
-        gap = range_m - self.range_m
-        # The running slope is a mean in which each stretch counts by its length.
-        rise = lowest - self.height_m
-        slope = self.slope + (rise - self.slope * gap) / (gap + np.float32(self.ground.tuning.slope_length_m))
-        steepest = self.ground.hill_slope
-        np.copyto(self.slope, np.minimum(np.maximum(slope, -steepest), steepest), where=found)
-        np.copyto(self.height_m, lowest, where=found)
-        np.copyto(self.range_m, range_m, where=found)
-
-    def _reached(self, lowest: Float32, range_m: Float32, is_ground: Bool, may_be_reached: Bool) -> Bool:
-        """(SECTORS,) ground of a ring, and the cells that it reaches along the ring, from cell to cell."""
-        while True:
-            more = self._continues_beside(lowest, range_m, is_ground, self.ground.tuning.noise_m)
-            more &= may_be_reached & ~is_ground
-            if not more.any():
-                return is_ground
-            is_ground = is_ground | more
-
-    def _continues_beside(self, lowest: Float32, range_m: Float32, is_ground: Bool, noise_m: float = 0.0) -> Bool:
-        """(SECTORS,) lowest returns of a ring that continue the ground of the same ring on a ray beside theirs."""
-        max_rise_m = range_m * np.float32(self.ground.max_rise_beside) + np.float32(noise_m)
-        ground = np.where(is_ground, lowest, np.float32(np.nan))
-        left, right = (np.abs(lowest - np.roll(ground, step)) < max_rise_m for step in (1, -1))
-        return np.asarray(left | right)
-
-    def _keep(self, ring: int, found: Bool, stands: Bool) -> None:
-        """Note the cells of a ring."""
-        flank_sectors = self.ground.tuning.flank_sectors
-        self.on_ramp = np.abs(self.slope) > self.ground.ramp_slope
-        left, right = (np.roll(self.on_ramp, step) for step in (flank_sectors, -flank_sectors))
-        self.beside_ramp = self.on_ramp | left | right
-        self.is_ground[ring] = found
-        self.is_ramp[ring] = self.beside_ramp
-        self.stands[ring] = stands
-
-
-def _position(lowest: Float32) -> Float32:
-    """(...) positions of lowest returns in their rings, from 0 to 1."""
-    return (lowest.view(np.int32) & POSITION_MASK).astype(np.float32) * np.float32(1 / POSITIONS)
-
-
-def _lowered(lowest: Float32, by_m: float) -> Float32:
-    """(...) heights of lowest returns less `by_m`, with their positions."""
-    height: Float32 = lowest - np.float32(by_m)
-    bits = (height.view(np.int32) & ~POSITION_MASK) | (lowest.view(np.int32) & POSITION_MASK)
-    return bits.view(np.float32)
 
 
 def _median_across(surface: Float32, step: int = 1) -> Float32:

@@ -65,7 +65,7 @@ def _filled(layout: Layout, *sources: object, **others: Any) -> Filled:
 
 
 def _ground(ground: GroundEstimator, bounds: Bounds) -> Filled:
-    sources = bounds, ground, ground.tuning, ground.grid
+    sources = bounds, ground, ground.slopes, ground.tuning, ground.grid
     chosen = {"clear_m": ground.tuning.clear_m, "n_gaps": len(ground.gaps)}
     return _filled(GROUND, *sources, sectors=SECTORS, quarters=QUARTERS, far_m=FAR_M, **chosen)
 

@@ -12,10 +12,11 @@ from modt.segmentation.ceiling import CeilingFinder
 from modt.segmentation.clustering import Clusterer
 from modt.segmentation.clusters import Clusters, Members
 from modt.segmentation.gaps import gaps_of
-from modt.segmentation.ground import GroundEstimator, HeightEstimator
+from modt.segmentation.ground import GroundEstimator
 from modt.segmentation.groups import HEADINGS, has_reflectance
 from modt.segmentation.kernels import NUMPY, Above, Bounds, Kernels
 from modt.segmentation.low import LowFinder
+from modt.segmentation.sensor_height import HeightEstimator
 from modt.segmentation.support import support_z_m
 from modt.segmentation.tuning import SegmentationTuning
 from modt.segmentation.view_ends import ViewEnds
