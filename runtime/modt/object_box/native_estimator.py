@@ -10,7 +10,9 @@ from modt.class_sizes import IS_PERSON, IS_WALKER, MAX_SIZE_M, USUAL_SIZE_M, USU
 from modt.classes import N_CLASSES
 from modt.geometry.kernels import GeometryKernels
 from modt.native.declarations import declare, structure
-from modt.object_box.estimator import HEADINGS, SIDES, WholeBoxes, forward_of
+from modt.object_box.estimator import WholeBoxes
+from modt.object_box.rectangles import HEADINGS, SIDES
+from modt.object_box.seen import forward_of
 from modt.object_box.tuning import ObjectBoxTuning
 from modt.types import Float64, Int, Motion, ObjectBoxes, Proposals
 
