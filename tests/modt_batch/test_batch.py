@@ -87,12 +87,6 @@ def test_two_workers_of_a_scheduler_one_of_them_killed_make_the_same_dataset(dri
     assert not list((tmp_path / "out").rglob(".*"))
 
 
-def test_processes_of_this_machine_make_the_same_dataset(drives, whole, tmp_path):
-    done = modt(*words(drives, "out", "--jobs", 2, "--pages", 0), cwd=tmp_path)
-    assert (done.returncode, done.stdout) == (0, ""), done.stderr
-    assert contents(tmp_path / "out") == contents(whole)
-
-
 def test_a_stopped_batch_goes_on_and_nothing_is_done_twice_or_missing(drives, whole, tmp_path, monkeypatch):
     out = tmp_path / "out"
     replayed = []
@@ -145,7 +139,7 @@ def interruptible():
 
 @pytest.mark.usefixtures("interruptible")
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_ctrl_c_keeps_the_runs_that_are_done_and_they_are_not_done_again(drives, whole, tmp_path, jobs):
+def test_ctrl_c_keeps_the_runs_that_are_done_and_they_are_not_done_again(drives, whole, tmp_path, capsys, jobs):
     out = tmp_path / "out"
     endless = tmp_path / "endless"  # a recording that is not at its end when the signal comes
     endless.mkdir()
@@ -164,7 +158,8 @@ def test_ctrl_c_keeps_the_runs_that_are_done_and_they_are_not_done_again(drives,
     assert "Traceback" not in errors
     before = committed(out)
     assert 1 <= len(before) <= 6
-    assert local(drives, out) == 0
+    assert here(*words(drives, out, *options)) == 0
+    assert capsys.readouterr().out == ""
     assert contents(out) == contents(whole)
     assert before.items() <= committed(out).items()
 
