@@ -303,13 +303,13 @@ def test_another_sensor_is_noticed_and_followed_and_the_first_one_is_believed_ag
     before, *_ = of_drive("hdl-64e", 0, 1)
     stages.choose_profile(before)
     assert stages.chosen.name == "hdl-64e"
-    assert followed(stages, of_drive("hdl-64e", 0, 30)).keys == ()
-    trust = followed(stages, of_drive("vlp-16", 30, 40))
+    assert followed(stages, of_drive("hdl-64e", 0, 20)).keys == ()
+    trust = followed(stages, of_drive("vlp-16", 20, 30))
     assert stages.misfits == 1
     assert stages.chosen.name == "as found"
     assert stages.config.sensor.elevation_step_deg > 1.0 or stages.config.sensor.elevations_deg
     assert "profile" in trust.keys
-    followed(stages, of_drive("hdl-64e", 70, 40))
+    followed(stages, of_drive("hdl-64e", 50, 15))
     assert (stages.misfits, stages.chosen.name) == (2, "hdl-64e")
 
 

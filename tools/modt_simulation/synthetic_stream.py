@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -35,6 +36,7 @@ from modt_simulation.sensors import sensor as sensor_model
 from modt_simulation.simulator import Simulator, Truth
 from modt_simulation.street import crossing, street
 from modt_simulation.weather import read_weather
+from modt_simulation.world import World
 from modt_simulation.yard import crowd, dock, ramp, yard
 
 T_CAMERA_SENSOR = np.array([[0.0, -1, 0, 0], [0, 0, -1, -0.08], [1, 0, 0, -0.27], [0, 0, 0, 1]])
@@ -93,7 +95,7 @@ class SyntheticStream:
         model = sensor_model(sensor)
         if mounted is not None:
             height_m = mounted.position_m[2]
-        world = SCENES[scene](np.random.default_rng([seed, 0]), seconds, height_m or model.height_m)
+        world = world_of(SCENES[scene], seed, seconds, height_m or model.height_m)
         roll, pitch = (np.deg2rad(mount_deg) + world.mount_rad).tolist()
         walk = Gait.of(gait, np.random.default_rng([seed, 4])) if gait else None
         if mounted is not None:
@@ -145,6 +147,14 @@ class SyntheticStream:
         part._indices = range(max(first, self._indices.start), stop)
         part.info = replace(self.info, n_frames=len(part._indices), end=part._indices.stop)
         return part
+
+
+@lru_cache(maxsize=8)
+def world_of(
+    scene: Callable[[np.random.Generator, float, float], World], seed: int, seconds: float, height_m: float
+) -> World:
+    """World of a scene, which never changes: to make a street takes as long as ten sweeps of it."""
+    return scene(np.random.default_rng([seed, 0]), seconds, height_m)
 
 
 def embedded_street() -> SyntheticStream:
