@@ -19,10 +19,8 @@ settings.load_profile("modt")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Keep the tests of a file in one process, and those that exchange ROS 2 messages in one process of all."""
-    for item in items:
-        group = "ros2" if "loopback" in getattr(item, "fixturenames", ()) else str(item.path)
-        item.add_marker(pytest.mark.xdist_group(group))
+    """Run what is installed first: it takes longest, and no process shall wait for it at the end."""
+    items.sort(key=lambda item: item.get_closest_marker("install") is None)
 
 
 @pytest.fixture(scope="session")

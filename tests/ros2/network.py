@@ -1,17 +1,19 @@
 """Two domains of this process that meet over the loopback interface as two processes do."""
 
+import os
 import time
 
 import pytest
 
 from modt.errors import ModtError
 
-NEAR = 201
-FAR = 202
+WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+NEAR, FAR, WIRE = (201 + 10 * WORKER + k for k in range(3))
+"""Two domains that only this process of tests joins, and the one that both are on the wire."""
 LOOPBACK = (
     '<CycloneDDS><Domain Id="any"><General><AllowMulticast>false</AllowMulticast>'
     '<Interfaces><NetworkInterface name="lo"/></Interfaces></General>'
-    "<Discovery><ExternalDomainId>203</ExternalDomainId><ParticipantIndex>auto</ParticipantIndex>"
+    f"<Discovery><ExternalDomainId>{WIRE}</ExternalDomainId><ParticipantIndex>auto</ParticipantIndex>"
     '<Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>'
 )
 DEADLINE_S = 60.0

@@ -9,15 +9,13 @@ import pytest
 
 from modt.sinks.topics import OBJECTS, TopicOptions, topics
 from tests.results import CAR, PEDESTRIAN, result
-from tests.ros2.network import DEADLINE_S, NEAR
+from tests.ros2.network import DEADLINE_S, NEAR, WIRE
 
 pytest.importorskip("cyclonedds")
 from modt.ros2 import dds
 
 pytestmark = pytest.mark.usefixtures("loopback")
 SOURCE = Path(__file__).with_name("fast_dds_subscriber.cpp")
-DOMAIN = 203
-"""Domain on the wire of `loopback`."""
 FRAME = result(3, [5, 4], {0: 1, 1: 12}, {1: CAR, 12: PEDESTRIAN})
 
 
@@ -38,7 +36,7 @@ def test_fast_dds_takes_the_objects(subscriber, form):
     sent = topic.encode(FRAME)
     package, _, short = topic.type.partition("/")
     publication = dds.Publication(dds.participant(NEAR), topic.name, topic.type)
-    arguments = [str(DOMAIN), f"rt{topic.name}", f"{package}::msg::dds_::{short}_", str(int(DEADLINE_S))]
+    arguments = [str(WIRE), f"rt{topic.name}", f"{package}::msg::dds_::{short}_", str(int(DEADLINE_S))]
     with subprocess.Popen([subscriber, *arguments], stdout=subprocess.PIPE, text=True) as process:
         while process.poll() is None:  # a volatile message is sent again until the subscriber has joined
             assert publication.write(sent)
