@@ -14,8 +14,8 @@ replay: $(VENV)/.run
 	$(BIN)/modt view runs/embedded
 	@echo "To look at it: open runs/embedded/view.html in a browser"
 
-# Two processes share the tests file by file, in the order of tests/conftest.py.
-PYTEST := $(BIN)/python -m pytest -p no:cacheprovider --numprocesses=2 --dist=loadfile --no-loadscope-reorder
+# Two processes share the tests file by file, in the order of tests/conftest.py. Threads of BLAS would get in their way.
+PYTEST := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -p no:cacheprovider --numprocesses=2 --dist=loadfile --no-loadscope-reorder
 
 test: check
 	$(PYTEST)

@@ -66,12 +66,12 @@ def environment(tmp_path) -> Path:
     return bare_environment(tmp_path / "environment")
 
 
-def install(environment: Path, *what: str) -> None:
+def install(environment: Path, *what: str, **variables: str) -> None:
     """Install with this environment's pip, from what is on this machine alone."""
     python = environment / "bin" / "python"
     command = [sys.executable, "-m", "pip", "--python", str(python), "install", "--quiet", "--no-deps", "--no-index"]
     quiet = ["--disable-pip-version-check", "--no-build-isolation", "--ignore-installed"]
-    subprocess.run([*command, *quiet, *what], check=True, capture_output=True, text=True)
+    subprocess.run([*command, *quiet, *what], check=True, capture_output=True, text=True, env=os.environ | variables)
 
 
 @pytest.mark.install

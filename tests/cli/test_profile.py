@@ -6,6 +6,8 @@ import pytest
 
 from modt import profile as profiles
 from modt_commands import profile
+from modt_simulation.synthetic_stream import SyntheticStream
+from tests import recorded
 
 from .commands import content, here, refusal, succeeded
 
@@ -23,10 +25,17 @@ def test_meters_are_listed_with_reasons(capsys):
 
 
 @pytest.fixture(scope="module")
-def compared(tmp_path_factory):
+def scans(tmp_path_factory):
+    """Options of a recording of a small sensor."""
+    stream = SyntheticStream("street", "vlp-16", 0.8, 0)
+    return recorded.scans(tmp_path_factory.mktemp("scans"), stream), "--profile", "vlp-16"
+
+
+@pytest.fixture(scope="module")
+def compared(scans, tmp_path_factory):
     """Folder in which the modes were compared: other.json and page.html."""
     folder = tmp_path_factory.mktemp("compared")
-    options = ("--frames", "0:8", "--repeat", 1, "--json", "--html", "page.html")
+    options = (*scans, "--repeat", 1, "--json", "--html", "page.html")
     done = succeeded("compare", *options, cwd=folder, module="modt_commands.profile")
     (folder / "other.json").write_text(done.stdout)
     return folder
@@ -42,21 +51,23 @@ def test_compare_runs_every_mode(compared):
     assert "<svg" in (compared / "page.html").read_text()
 
 
-def test_a_prediction_is_compared_with_what_is_measured(compared, tmp_path, monkeypatch, capsys):
+def test_a_prediction_is_compared_with_what_is_measured(scans, compared, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     other = (compared / "other.json").read_text()
     (tmp_path / "other.json").write_text(other)
-    assert "other.json" in refusal(capsys, "predict", "--calibration", "other.json", program=profile.main)
+    assert "other.json" in refusal(capsys, "predict", *scans, "--calibration", "other.json", program=profile.main)
     (tmp_path / "other.json").write_text(json.dumps(json.loads(other) | {"stream": "elsewhere"}))
-    arguments = ("--frames", "4:8", "--calibration", "other.json", "--observe", "all", "--out", "blind.json")
+    arguments = (*scans, "--frames", "4:8", "--calibration", "other.json", "--observe", "all", "--out", "blind.json")
     assert here("predict", *arguments, program=profile.main) == 0
     assert "efficient: gamma predicted" in capsys.readouterr().out
     blind = content(tmp_path / "blind.json")
     assert (blind["seen"], blind["calibration"]) == (4, ["elsewhere"])
-    arguments = ("--frames", "4:8", "--repeat", 1, "--against", "blind.json")
+    arguments = (*scans, "--frames", "4:8", "--repeat", 1, "--against", "blind.json")
     assert here("compare", *arguments, program=profile.main) == 0
     assert "gamma, accurate: predicted" in capsys.readouterr().out
-    assert "asked" in refusal(capsys, "compare", "--frames", "0:4", "--against", "blind.json", program=profile.main)
+    assert "asked" in refusal(
+        capsys, "compare", *scans, "--frames", "0:4", "--against", "blind.json", program=profile.main
+    )
 
 
 def test_calibration_writes_a_profile_that_loads(tmp_path, monkeypatch, capsys):

@@ -12,7 +12,8 @@ CONSTANTS = list(sensitivity.constants(MethodTuning()))
 
 
 def test_one_value_is_changed_and_no_other():
-    for constant in CONSTANTS:
+    one_of_each_part = {constant.path[:-1]: constant for constant in CONSTANTS}
+    for constant in one_of_each_part.values():
         changed = sensitivity.with_value(MethodTuning(), constant.path, constant.changed(0.2))
         before_and_after = zip(CONSTANTS, sensitivity.constants(changed), strict=True)
         assert [a.name for a, b in before_and_after if a.value != b.value] == [constant.name]
