@@ -190,7 +190,7 @@ def _cuboids(folder: Path, scans: ScanStream | None) -> Mapping[int, FrameTruth]
         by_frame = defaultdict(list, {number: by_frame[i] for i, number in enumerate(numbers)})
     elif strangers := by_frame.keys() - set(numbers):
         cause = f"{len(poses)} poses, none for frame {max(strangers)}"
-        raise MisuseError(folder / POSES, cause, "give one a frame")
+        raise MisuseError(folder / POSES, cause, "give one a frame, which is the number of a scan or counts from 0")
     place = folder / CUBOIDS
     return {f: _frame(CUBOID_TYPES, place, by_frame[f], T_box_sensor=T) for f, T in zip(numbers, poses, strict=True)}
 
