@@ -123,7 +123,7 @@ def test_stamps_from_1970_are_times_and_fit_a_narrow_page(run, records, tmp_path
     for more in ([], ["--frame", 9]):
         assert here("view", dated, *more) == 0
     with chromium.tab((dated / "view.html").as_uri(), width=390) as tab:
-        assert tab.value("element('time').textContent").startswith("16:53:20.00, 1 / ")
+        assert tab.value("element('time').textContent").startswith("16:53:20.00, 1\xa0/\xa0")
         assert not tab.value(WIDE)
         right = "document.querySelector('footer').lastElementChild.getBoundingClientRect().right"
         assert tab.value(right) <= 390

@@ -15,6 +15,7 @@ const time = (stamp) => stamp < 1e8 ? `${stamp.toFixed(2)} s` : new Date(1000 * 
 let factsOf = (frame) => [], costOf = (rows) => "";
 
 const NEAREST = 6; // movers that are listed
+const LONG = 30; // letters of a value that has a line of its own
 const SIDES = ["ahead", "ahead left", "left", "behind left", "behind", "behind right", "right", "ahead right"];
 const energy = (mJ, { kind }) => `${mJ.toFixed(mJ < 100 ? 1 : 0)} mJ, ${kind}`;
 const rangeOf = (row) => Math.hypot(row.x, row.y);
@@ -25,7 +26,8 @@ function describe(row) {
   const nearer = -(row.x * Math.cos(heading) + row.y * Math.sin(heading)) / rangeOf(row);
   const whither = nearer > 0.7 ? "comes nearer" : nearer < -0.7 ? "goes away" : "crosses";
   const name = words(run.classes[row.class].name);
-  return `${name} #${row.id}, ${rangeOf(row).toFixed(0)} m ${side}, ${row.world_speed_mps.toFixed(1)} m/s, ${whither}`;
+  const range = `${rangeOf(row).toFixed(0)}\u00a0m`, speed = `${row.world_speed_mps.toFixed(1)}\u00a0m/s`; // no line ends before a unit
+  return `${name} #${row.id}, ${range} ${side}, ${speed}, ${whither}`;
 }
 
 // How many of each kind are around.
@@ -54,7 +56,10 @@ function showMovers(rows) {
 
 function showFacts(list, facts) {
   list.replaceChildren();
-  for (const [name, value] of facts.filter(([, value]) => value !== null)) add(list, "dt", name), add(list, "dd", value);
+  for (const [name, value] of facts.filter(([, value]) => value !== null)) {
+    add(list, "dt", name);
+    add(list, "dd", value, { className: `${value}`.length > LONG ? "long" : "" });
+  }
 }
 
 function showFrame() {
@@ -85,7 +90,7 @@ function showFrame() {
     add(element("stages"), "i", "", { title: `${name} ${part.toFixed(1)} ms` })
       .style.cssText = `width:${100 * part / (cpu || 1)}%;background:${colour}`;
   }
-  element("time").textContent = `${time(frame.stamp_s)}, ${state.at + 1} / ${last + 1}`;
+  element("time").textContent = `${time(frame.stamp_s)}, ${state.at + 1}\u00a0/\u00a0${last + 1}`;
   slider.value = state.at;
 }
 
