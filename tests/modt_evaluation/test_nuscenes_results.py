@@ -1,4 +1,9 @@
-"""Results in nuScenes' format, and their score against that of its devkit."""
+"""Results in nuScenes' format, and their score against that of its devkit.
+
+The devkit asks for NumPy 1, so it is not among the tests' libraries. It works beside NumPy 2 if installed by
+`pip install --no-deps nuscenes-devkit cachetools descartes joblib motmetrics narwhals opencv-python-headless pandas
+parameterized pyquaternion python-dateutil pytz scikit-learn six threadpoolctl`.
+"""
 
 import json
 
