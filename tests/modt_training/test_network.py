@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 
 
-def test_max_pooled_linear_has_the_gradients_of_its_definition():
+@pytest.mark.parametrize("block_points", [1, 9, 768])
+def test_max_pooled_linear_has_the_gradients_of_its_definition(block_points, monkeypatch):
     torch = pytest.importorskip("torch", reason="extra [train] is not installed")
+    from modt_training import network
     from modt_training.network import MaxPooledLinear
 
+    monkeypatch.setattr(network, "BLOCK_POINTS", block_points)
     torch.manual_seed(0)
     count = torch.tensor([1, 7, 30])
     x = torch.randn(38, 5, requires_grad=True)
