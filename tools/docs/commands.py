@@ -32,10 +32,14 @@ def cells(parser: argparse.ArgumentParser, action: argparse.Action) -> tuple[str
     return f"`{name}`", parser._get_formatter()._expand_help(action)
 
 
+def _is_shown(action: argparse.Action) -> bool:
+    return action.dest != "help" and action.help != argparse.SUPPRESS
+
+
 def page() -> str:
     """A table of the options that commands share, and a list of the other options of each command."""
     found = [command for program in parsers() for command in commands(program)]
-    rows = {p.prog: [cells(p, action) for action in p._actions if action.dest != "help"] for _, p in found}
+    rows = {p.prog: [cells(p, action) for action in p._actions if _is_shown(action)] for _, p in found}
     number = Counter(chain.from_iterable(rows.values()))
     lines = ["## Shared options", "", "| option | | of |", "|---|---|---|"]
     for option in (option for option, n in number.items() if n > 1):
