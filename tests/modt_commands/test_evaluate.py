@@ -125,6 +125,7 @@ def test_runs_judged_by_several_processes_have_the_same_figures(drives, capsys):
     ("words", "named"),
     [
         (["--experiment", "table9", "--simulated", "1"], "table3"),
+        (["--experiment", "table9", "--experiment", "table4", "--simulated", "1"], "table9"),
         (["--experiment", "table4"], "no drives"),
         (["RUN", "TRUTH", "--experiment", "table4"], "takes no runs"),
         (["--experiment", "table3", "--simulated", "1"], "none of the drives"),

@@ -23,7 +23,7 @@ def add_options(p: argparse.ArgumentParser) -> None:
     """Options of the experiments, and those that the evaluation of runs shares with them."""
     g = p.add_argument_group("experiments", "the paper's tables and figures on KITTI and simulated drives")
     which = "experiments by name, or all (docs/evaluation.md)"
-    g.add_argument("--experiment", nargs="+", metavar="NAME", help=which)
+    g.add_argument("--experiment", nargs="+", action="extend", metavar="NAME", help=which)
     g.add_argument("--kitti", type=Path, metavar="ROOT", help="folder below which labelled KITTI drives lie")
     count = options.bounded(int, 0, 10_000, "drives")
     g.add_argument("--simulated", type=count, default=0, metavar="N", help="number of simulated drives")

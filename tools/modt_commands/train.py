@@ -21,7 +21,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     labelled = "labelled recordings, two or more: what modt evaluate takes as labels"
     p.add_argument("recordings", nargs="+", type=Path, metavar="RECORDING", help=labelled)
     beside = "labels of each recording, in their order (default: those beside it)"
-    p.add_argument("--labels", nargs="+", type=Path, default=[], metavar="TRUTH", help=beside)
+    p.add_argument("--labels", nargs="+", action="extend", type=Path, default=[], metavar="TRUTH", help=beside)
     options.add(p, "profile")
     p.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="folder of the model and its profile")
     p.add_argument("--name", default="own", help="name of the model and the profile (default: %(default)s)")
