@@ -206,3 +206,11 @@ def test_without_a_profile_of_a_sensor_the_first_sweep_shows_which_it_is(frames,
     assert library.config.sensor.elevation_step_deg == pytest.approx(2.0, rel=0.02)
     assert library.config.energy == load(*profiles).energy
     assert [record.message.count("used instead") for record in caplog.records] == [1]
+
+
+def test_a_sensor_that_is_covered_at_first_is_recognised_when_it_is_uncovered(frames):
+    library = modt.Pipeline.from_profile()
+    for k in range(3):
+        library.step(np.zeros((100, 4)), 0.1 * k)
+    library.step(frames[0].points, 0.3)
+    assert library.config.sensor.elevation_step_deg == pytest.approx(2.0, rel=0.02)

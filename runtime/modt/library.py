@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from modt import profile
 from modt.app import assembly
-from modt.app.chosen_profile import choose
+from modt.app.chosen_profile import AwaitedSweep, choose
 from modt.class_sizes import unknown_near
 from modt.classes import CLASS_NAMES, ObjectClass
 from modt.classification.own_classifier import Classifier, OwnClassifier
@@ -207,6 +207,7 @@ class Pipeline:
         self._asked: profile.Resolved | ProfileConfig = config
         self._use(config)
         self._index = 0
+        self._awaited = AwaitedSweep()
         self._stamp_s = -math.inf  # of the last sweep
         self._warned = False  # of stamps that are no seconds
 
@@ -322,10 +323,11 @@ class Pipeline:
             rows: Any = points  # checked below
             points = Frame(self._index, self._checked_stamp(stamp_s), rows, turn_s=turn_s, mid_rad=mid_rad)
         frame = self._checked(points, T_world_sensor)
-        if self._index == 0:
+        if self._awaited.comes_with(frame):
             chosen = choose(self._asked, frame, None)
             if chosen.config != self.config:
                 self._use(chosen.config)
+            self._awaited.take(frame)
         self._warn_of_unit(frame.stamp_s)
         self._index += 1
         self._stamp_s = frame.stamp_s

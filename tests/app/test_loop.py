@@ -154,6 +154,22 @@ def test_sinks_get_no_result_of_a_blind_sensor_where_the_profile_says_so(results
     assert live.service.recording.write.call_count == len(live.seen) == 20, "the records go on"
 
 
+def test_the_sensor_is_told_again_by_the_first_sweep_with_enough_points():
+    live = Live(2.0)
+    take = live.sensor.take
+
+    def uncovered_at_the_fifth(timeout_s):
+        received = take(timeout_s)
+        if received is None or received.frame.index < 5:
+            return received
+        points = np.full((2000, 4), 5.0, np.float32)
+        return dataclasses.replace(received, frame=dataclasses.replace(received.frame, points=points))
+
+    live.sensor.take = uncovered_at_the_fifth
+    live.run()
+    assert [made.args[0].index for made in live.stages.choose_profile.call_args_list] == [1, 5]
+
+
 def test_every_sweep_in_time_goes_through():
     sink = Kept()
     live = Live(10.0, sinks=[sink]).run()

@@ -110,6 +110,17 @@ def test_a_fault_is_reported_within_two_seconds_and_withdrawn_within_three(name)
     assert_reported_and_withdrawn([trust.level for trust in judged("street", FAULTS[name])])
 
 
+@pytest.mark.parametrize("name", ["all distances zero", "empty", "in millimetres"])
+def test_a_sensor_that_shows_nothing_from_its_start_on_is_blind_until_it_does(name):
+    watch = TrustWatch(load(SENSOR).sensor)
+    levels = []
+    for k, frame in enumerate(drive("street")):
+        points = FAULTS[name](frame.points, k) if k < END else frame.points
+        levels.append(watch.add(replace(frame, points=points), frame.T_world_sensor).level)
+    assert set(levels[15:END]) == {TrustLevel.BLIND}
+    assert set(levels[END + 25 :]) == {TrustLevel.GOOD}
+
+
 @pytest.mark.parametrize("posed", [True, False], ids=["posed", "registered"])
 @pytest.mark.parametrize("share", [0.3, 0.5, 0.7])
 @pytest.mark.parametrize("name", sorted(FAULTS.keys() - {"frozen"}))

@@ -11,6 +11,7 @@ from modt import profile
 from modt.app.assembly import sensor_profile
 from modt.config import ProfileConfig
 from modt.profile import Resolved
+from modt.sensor_fit.beams import can_show_beams
 from modt.sensor_fit.recognition import Recognition, recognise
 from modt.sources.stream import StreamInfo
 from modt.types import Frame
@@ -50,6 +51,23 @@ class ChosenProfile:
     def fits(self) -> bool:
         """Whether the beams are those of the first sweep."""
         return self.sensor == FOUND or self.recognition.fits
+
+
+class AwaitedSweep:
+    """The sweeps that tell the sensor: the first one and, if it has too few points, the first one with enough."""
+
+    def __init__(self) -> None:
+        self._began = False
+        self._told = False
+
+    def comes_with(self, frame: Frame) -> bool:
+        """Whether the profile is to be chosen by this frame."""
+        return not self._began or (not self._told and can_show_beams(frame.points))
+
+    def take(self, frame: Frame) -> None:
+        """Note that the profile was chosen by this frame."""
+        self._began = True
+        self._told = can_show_beams(frame.points)
 
 
 def choose(requested: Resolved | ProfileConfig, first: Frame | None, info: StreamInfo | None) -> ChosenProfile:

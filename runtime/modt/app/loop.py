@@ -9,11 +9,11 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, replace
-from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from modt.app.account import Travel
+from modt.app.chosen_profile import AwaitedSweep
 from modt.app.deadlines import Deadlines, NoDeadlines
 from modt.app.failures import RENEW_AFTER, Failures
 from modt.app.playback import Playback
@@ -128,7 +128,7 @@ class Loop:
         return self.summary
 
     def process_frames(self, notifier: Notifier) -> None:
-        """Process frames until a signal, or the end of the source. The first one identifies the sensor.
+        """Process frames until a signal, or the end of the source. The first one with enough points tells the sensor.
 
         Garbage is collected once at the start, and what is left is frozen. Later collections leave that out, so they
         are short.
@@ -139,12 +139,11 @@ class Loop:
         gc.collect()
         gc.freeze()
         notifier.ready()
-        sweeps = self._sweeps(notifier)
-        first = next(sweeps, None)
-        if first is None:
-            return
-        self.failures.contain(PROFILE, self.stages.choose_profile, first.frame, self.source.profile)
-        for received in chain([first], sweeps):
+        awaited = AwaitedSweep()
+        for received in self._sweeps(notifier):
+            if awaited.comes_with(received.frame):
+                self.failures.contain(PROFILE, self.stages.choose_profile, received.frame, self.source.profile)
+                awaited.take(received.frame)
             if self.deadlines.admit(received.arrived_s):
                 self._process(received)
 

@@ -17,7 +17,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from modt import assets, profile
 from modt.config import SegmentationConfig, SensorConfig
-from modt.types import Float32, Float64, Int, Self
+from modt.types import Bool, Float32, Float64, Int, Self
 
 _GAUSSIAN_REACH = 4.0
 """Half width of a Gaussian [standard deviations]. Filtered rows continue mirrored beyond their ends."""
@@ -126,6 +126,17 @@ class BeamPattern:
     contrast: float = 0.0
 
 
+def can_show_beams(points: Float32) -> bool:
+    """Whether (N, 4) points of a sweep are enough to find its beams."""
+    return int(np.count_nonzero(_far(points))) >= MIN_POINTS
+
+
+def _far(points: Float32) -> Bool:
+    """(N,) points beyond MIN_RANGE_M."""
+    far: Bool = np.hypot(points[:, 0], points[:, 1]) > MIN_RANGE_M
+    return far
+
+
 def find_beams(sweeps: Sequence[Float32], origins_m: Float64 = ORIGINS_M) -> BeamPattern | None:
     """Beams of sweeps of (N, 4) points; None if there are too few points.
 
@@ -133,7 +144,7 @@ def find_beams(sweeps: Sequence[Float32], origins_m: Float64 = ORIGINS_M) -> Bea
         sweeps: points of each [m], level or not.
         origins_m: tried heights of the beams' origin above that of the frame; the first one is the frame's own.
     """
-    used = [points[np.hypot(points[:, 0], points[:, 1]) > MIN_RANGE_M] for points in sweeps]
+    used = [points[_far(points)] for points in sweeps]
     if sum(map(len, used)) < MIN_POINTS:
         return None
     rings = _Rings.of_points(np.concatenate(used), origins_m[:1])

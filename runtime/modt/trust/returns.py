@@ -25,6 +25,8 @@ BAND_POINTS = 24.0
 """Fewest sampled points of a band that is expected."""
 MIN_POINTS = 8.0
 """Fewest sampled points of a sector, and half those of a cell in which the share of returns is judged."""
+LEAST_POINTS = MIN_POINTS * BANDS
+"""Fewest sampled points of a sweep by which the usual returns become known."""
 THIRDS = 3
 """Parts of the bands in which the share of returns is judged."""
 SIDES = ("ahead", "to the left", "behind", "to the right")
@@ -59,13 +61,19 @@ class ReturnsCheck:
         """Follow the returns of a sweep."""
         if self._span is None:
             n = sample.xyz.shape[1]
-            if n < MIN_POINTS * BANDS:
+            if n < LEAST_POINTS:
                 return
             tangent = np.sort(sample.tangent_in_sensor)
             self._span = float(tangent[int(OUTER * n)]), float(tangent[int((1 - OUTER) * n)]) + 1e-3
             self._usual = self._count(sample)
         gain = min(elapsed_s / self._tuning.memory_s, 1.0)
         self._usual += gain * (self._count(sample) - self._usual)
+
+    def none_yet(self, sample: Sample) -> Loss | None:
+        """The whole view, if neither this sweep nor one before had enough returns to know what is usual."""
+        if self._span is not None or sample.xyz.shape[1] >= LEAST_POINTS:
+            return None
+        return Loss(True, "hardly any returns since the start")
 
     def loss(self, samples: Sequence[Sample]) -> Loss | None:
         """Missing part of the last of the sweeps since the last look; None if nothing is, or nothing is known."""

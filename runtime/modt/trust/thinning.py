@@ -39,6 +39,6 @@ class ThinningHistory:
             self._most = self._recent
         elif not self.missing_share:
             self._most = max(self._recent, self._most + (self._recent - self._most) / tuning.memory_looks)
-        known = self._most >= tuning.least_usual * sample.weight
+        known = self._most > tuning.least_usual * sample.weight
         missing_share = 1.0 - self._recent / self._most if known else 0.0
         self.missing_share = missing_share if missing_share > tuning.missing_share else 0.0

@@ -144,7 +144,12 @@ class TrustWatch:
     def _look(self, sweep: Sample, elapsed_s: float, others: Mapping[str, Finding], *, learning: bool) -> None:
         """Run all checks on a sweep, some time after the last look, and judge by their findings."""
         now_s = sweep.time_s
-        own_findings = {} if learning else self._run_own_checks(sweep)
+        none_yet = self._returns.none_yet(sweep)
+        if none_yet:  # what is expected is learned from the first sweep on that has returns
+            self._began_s = now_s
+        own_findings = dict(self._own_findings(none_yet, repeated=False))
+        if not learning and not none_yet:
+            own_findings = self._run_own_checks(sweep)
         self._beams.add(sweep)
         self._sectors.add(sweep)
         lasting = dict(self._lasting_findings())
