@@ -40,7 +40,6 @@ KNOCKED_S = 5.0
 BACK_S = 5.0
 """Time after the last fault after which the trust has to be good [s]."""
 POSES = "poses"
-"""Faults of the poses are not reported where what stands still is not in view, as under another fault."""
 
 
 @dataclass(frozen=True)
@@ -194,8 +193,14 @@ def moved_by(change: Change, frame: Frame, before: Frame) -> Frame:
 def silent(levels: list[TrustLevel], pair: tuple[Episode, Episode], period_s: float) -> list[str]:
     """Names of the faults during which the trust is good after their limit."""
     good = np.array(levels) == TrustLevel.GOOD
-    late = [(e, good[e.begin + round(e.change.limit_s / period_s) : e.end]) for e in pair]
+    late = [(e, good[seen_from(e, pair) + round(e.change.limit_s / period_s) : e.end]) for e in pair]
     return [f"{e.change.name}: good in {int(part.sum())} of {len(part)} frames" for e, part in late if part.any()]
+
+
+def seen_from(episode: Episode, pair: Sequence[Episode]) -> int:
+    """Frame from which on a fault can be seen: its first one or, if it begins during another one, the end of that."""
+    ends = [other.end for other in pair if other is not episode and other.begin <= episode.begin]
+    return max([episode.begin, *ends])
 
 
 def stuck(levels: list[TrustLevel], pair: tuple[Episode, Episode], period_s: float) -> list[str]:

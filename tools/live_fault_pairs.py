@@ -34,7 +34,7 @@ from modt_simulation.synthetic_stream import SyntheticStream
 from tools import fault_pairs
 from tools.deploy.faults import FAULTS, NO_FAULT
 from tools.deploy.sender import Faulty
-from tools.fault_pairs import CHANGES, SECONDS, SENSOR, Change, Episode, faulty, pair_options
+from tools.fault_pairs import CHANGES, SECONDS, SENSOR, Change, Episode, faulty, pair_options, seen_from
 from tools.send.faults import Timed
 from tools.send.ideal_packets import packets_of
 from tools.send.loops import VelodyneStamps
@@ -303,14 +303,13 @@ def judged(folder: Path, pair: Sequence[Episode], began_s: float) -> Iterator[st
     yield from _of_sweeps(status, json.loads((folder / "summary.json").read_bytes())["faults"]["skipped"])
     sweep = (np.array([line["stamp_s"] for line in lines]) - began_s) / PERIOD_S
     good = np.array([line["trust"]["level"] == "good" for line in lines])
-    for episode, other in (pair, pair[::-1]):
+    for episode in pair:
         change = episode.change
         if isinstance(change, OtherFault):
             if not change.counted(status):
                 yield f"{change.name}: not counted"
             continue
-        visible = max(episode.begin, other.end if other.begin <= episode.begin else 0)
-        late = (sweep > visible + change.limit_s / PERIOD_S + 1) & (sweep < episode.end - 1)
+        late = (sweep > seen_from(episode, pair) + change.limit_s / PERIOD_S + 1) & (sweep < episode.end - 1)
         if (good & late).any():
             yield f"{change.name}: good in {np.count_nonzero(good & late)} of {np.count_nonzero(late)} frames"
 
