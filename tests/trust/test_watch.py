@@ -110,8 +110,8 @@ def test_a_fault_is_reported_within_two_seconds_and_withdrawn_within_three(name)
     assert_reported_and_withdrawn([trust.level for trust in judged("street", FAULTS[name])])
 
 
-@pytest.mark.parametrize("name", ["all distances zero", "empty", "in millimetres"])
-def test_a_sensor_that_shows_nothing_from_its_start_on_is_blind_until_it_does(name):
+@pytest.mark.parametrize("name", ["all distances zero", "empty", "in millimetres", "frozen"])
+def test_a_sensor_that_shows_nothing_new_from_its_start_on_is_blind_until_it_does(name):
     watch = TrustWatch(load(SENSOR).sensor)
     levels = []
     for k, frame in enumerate(drive("street")):

@@ -147,9 +147,10 @@ class TrustWatch:
         none_yet = self._returns.none_yet(sweep)
         if none_yet:  # what is expected is learned from the first sweep on that has returns
             self._began_s = now_s
-        own_findings = dict(self._own_findings(none_yet, repeated=False))
+        repeated = _repeated(self._samples[-2], sweep)
+        own_findings = dict(self._own_findings(none_yet, repeated=repeated))
         if not learning and not none_yet:
-            own_findings = self._run_own_checks(sweep)
+            own_findings = self._run_own_checks(sweep, repeated=repeated)
         self._beams.add(sweep)
         self._sectors.add(sweep)
         lasting = dict(self._lasting_findings())
@@ -177,9 +178,11 @@ class TrustWatch:
         self._put_off = changed and soon and not self._put_off
         return self._put_off
 
-    def _run_own_checks(self, sweep: Sample) -> dict[str, Finding]:
-        """Run the checks of the sweeps themselves, and return their findings by the name of the check."""
-        repeated = _repeated(self._samples[-2], sweep)
+    def _run_own_checks(self, sweep: Sample, *, repeated: bool) -> dict[str, Finding]:
+        """Run the checks of the sweeps themselves, and return their findings by the name of the check.
+
+        `repeated` says whether the sweep is the one before once more.
+        """
         n_before = self._returns.n_dead
         loss = self._returns.loss(self._samples)
         n_dead = self._returns.n_dead
