@@ -135,6 +135,19 @@ def test_a_fault_that_begins_and_ends_within_a_sweep_is_reported_and_withdrawn_l
     assert_reported_and_withdrawn(levels)
 
 
+@pytest.mark.parametrize("share", [0.2, 0.5])
+@pytest.mark.parametrize("late", range(6))
+@pytest.mark.parametrize("name", ["upper beams dead", "lower beams dead", "a quarter of the view"])
+def test_a_loss_that_begins_within_the_sweep_of_a_look_is_reported_like_others(name, late, share):
+    """There is a look each sixth frame."""
+    watch = TrustWatch(load(SENSOR).sensor)
+    levels = []
+    for k, frame in enumerate(drive("street"), -late):
+        sweep = faulty_from(FAULTS[name], share, k, frame.points)
+        levels.append(watch.add(replace(frame, points=sweep), frame.T_world_sensor).level)
+    assert_reported_and_withdrawn(levels[late:])
+
+
 @pytest.mark.parametrize("scene", ["street", "yard"])
 @pytest.mark.parametrize("share", [0.3, 0.5, 0.7])
 def test_few_beams_are_no_turned_scene(scene, share):

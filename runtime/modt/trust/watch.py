@@ -90,6 +90,7 @@ class TrustWatch:
         self._sectors = SectorHistory(sensor, tuning.lasting)
         self._thinning = ThinningHistory(tuning.thinning)
         self._samples: list[Sample] = []  # the last MOST_SAMPLES + 1 at most since the last look, its own included
+        self._before_look: list[Sample] = []  # the one before that of the last look, within which a loss may begin
         self._debounced = Debounced(tuning.looks, tuning.back_looks)
         self._looked_s = -np.inf
         self._began_s: float | None = None
@@ -133,6 +134,7 @@ class TrustWatch:
             self._began_s = now_s
         if not self._samples or not 0 <= now_s - self._samples[-1].time_s <= GAP_S:
             self._samples = [sweep]
+            self._before_look = []
             self._looked_s = now_s
             return self.trust
         self._samples = [*self._samples[-MOST_SAMPLES:], sweep]
@@ -164,6 +166,7 @@ class TrustWatch:
             self._thinning.add(sweep)
             if self._ground.known:
                 self._mount.add(self._ground.plane, sweep.R_level_sensor)
+        self._before_look = self._samples[-2:-1]
         self._samples = self._samples[-1:]
         self._looked_s = now_s
         self.trust = self.trust.after(self._debounced.reasons.values(), now_s)
@@ -184,7 +187,7 @@ class TrustWatch:
         `repeated` says whether the sweep is the one before once more.
         """
         n_before = self._returns.n_dead
-        loss = self._returns.loss(self._samples)
+        loss = self._returns.loss([*self._before_look, *self._samples])
         n_dead = self._returns.n_dead
         if not repeated and not self._repeated:
             self._follow(same_beams=n_dead == n_before and n_dead <= MOST_DEAD)
