@@ -24,7 +24,7 @@ from modt.sensor_fit.recognition import recognise
 from modt.sources.stream import StreamInfo
 from modt.trust.sample import REACH_SHARE
 from modt.trust.visibility import VisibilityEstimate
-from modt.trust.watch import Finding, TrustWatch
+from modt.trust.watch import POSES, Finding, TrustWatch
 from modt.types import Budget, Frame, FrameResult, TrustLevel
 
 if TYPE_CHECKING:
@@ -163,7 +163,7 @@ class Stages:
         doubted_s = self._continuity.odometry.pose_check.doubted_s if self._continuity.odometry else 0.0
         if doubted_s >= DOUBTED_S:
             cause = "what stands still moves by the given poses, which are left out: the sweeps tell the motion"
-            findings["poses"] = Finding(TrustLevel.DEGRADED, cause, POSES_REMEDY)
+            findings[POSES] = Finding(TrustLevel.DEGRADED, cause, POSES_REMEDY)
         return findings
 
     def adapt(self, frame: Frame) -> None:

@@ -6,6 +6,7 @@ mirror reverses the bearing (Fourier-Mellin).
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -112,6 +113,8 @@ class SceneCheck:
         self.before: Sample | None = None
         self._agreed = 1.0  # share of the obstacle points that stood still at the last look
         self._looks = 0  # in a row in which the scene is back
+        # Sweeps of the last looks since the change. A robot moves farther between them than between two looks.
+        self._recent: deque[Sample] = deque(maxlen=tuning.motion_looks)
         self._compared: tuple[Sample, Sample, float] | None = None  # two sweeps, and the share that stood still
 
     def look(
@@ -121,7 +124,7 @@ class SceneCheck:
         pairs: Sequence[tuple[Sample, Sample]],
         back_looks: int,
         *,
-        on_moved_ground: bool = False,
+        unsure: bool = False,
     ) -> None:
         """Notice a scene that changes at once, and one that is back.
 
@@ -130,17 +133,19 @@ class SceneCheck:
             now: the sweep that is looked at.
             pairs: sweeps since then between which it may have changed; mostly those with one sweep between them.
             back_looks: number of looks in a row in which it has to be back.
-            on_moved_ground: whether the ground has moved. Obstacles are less sure then, so a change has to explain
-                nearly all of them, and a scale is left to the ground's check.
+            unsure: whether the ground has moved, or the way between the sweeps is not known. A change has to explain
+                nearly all obstacles then, and a scale is left to the ground's check.
         """
         tuning = self._tuning
         suspected = self.may_have_changed(first, now)
         self._agreed = self._agreement(first, now)
         if suspected or not self.change.is_none:
-            self._notice(pairs, on_moved_ground=on_moved_ground)
+            self._notice(pairs, unsure=unsure)
         if self.before is None:
             return
-        is_back = agreement(self.before, now, SAME) >= tuning.back or self._moves_as_before(first, now)
+        self._recent.append(now)
+        is_back = agreement(self.before, now, SAME) >= tuning.back
+        is_back = is_back or any(self._moves_as_before(earlier, now) for earlier in (first, *self._recent))
         self._looks = self._looks + 1 if is_back else 0
         if self._looks >= back_looks or self.change.is_none:
             self.change = SAME
@@ -170,11 +175,11 @@ class SceneCheck:
 
     def _moves_as_before(self, first: Sample, now: Sample) -> bool:
         """Whether obstacles move by a given pose as in a scene that is not changed, and not as in the changed one."""
-        if not now.pose_given:
+        if not (first.pose_given and now.pose_given):
             return False
         return agreement(first, now, SAME) > agreement(first, now, self.change) + self._tuning.better
 
-    def _notice(self, pairs: Sequence[tuple[Sample, Sample]], *, on_moved_ground: bool) -> None:
+    def _notice(self, pairs: Sequence[tuple[Sample, Sample]], *, unsure: bool) -> None:
         """Note how the scene changed within one of the pairs, if it did.
 
         What begins within a sweep falls into two pairs that follow one another, and only the pair around that sweep
@@ -190,18 +195,19 @@ class SceneCheck:
                 change, share = explain(pairs[k][0], after, self._known_change(after))
                 found.append((share - float(agreed[k]), k, change))
         gain, k, change = max(found, key=lambda each: each[0])
-        if self._is_explained(change, float(agreed[k]), gain, on_moved_ground=on_moved_ground):
+        if self._is_explained(change, float(agreed[k]), gain, unsure=unsure):
             if self.before is None:
                 self.before = pairs[k][0]
                 self._looks = 0
+            self._recent.clear()
             self.change = self.change.then(change)
 
-    def _is_explained(self, change: Change, agreed: float, gain: float, *, on_moved_ground: bool) -> bool:
+    def _is_explained(self, change: Change, agreed: float, gain: float, *, unsure: bool) -> bool:
         """Whether a change explains two sweeps, of which a share agrees without it, and more by a gain with it."""
         tuning = self._tuning
-        if change.is_none or (on_moved_ground and change.is_scaled):
+        if change.is_none or (unsure and change.is_scaled):
             return False
-        other_scene = agreed < tuning.same and not on_moved_ground
+        other_scene = agreed < tuning.same and not unsure
         needed = tuning.explained if other_scene else tuning.surely_explained
         if self.change.then(change).is_none:  # the way back
             needed = 0.0

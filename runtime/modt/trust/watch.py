@@ -20,6 +20,8 @@ from modt.trust.tuning import TrustTuning
 from modt.types import Float64, Frame, Reason, Trust, TrustLevel
 
 CLEAN = "clean and uncover the sensor, and check what stands before it"
+POSES = "poses"
+"""Name of the check that doubts given poses."""
 MOUNT = "check the mount of the sensor, then start anew"
 DRIVER = "restart the sensor and its driver"
 REPAIR = "have the sensor repaired; things at that height are seen from nearer only"
@@ -129,6 +131,8 @@ class TrustWatch:
         """
         before = self._samples[-1] if self._samples else None
         sweep = sample(frame, T_world_sensor, self._sensor, self._ground.present, before)
+        if POSES in others:  # the pose is a registered one
+            sweep = replace(sweep, pose_given=False)
         now_s = sweep.time_s
         if self._began_s is None:
             self._began_s = now_s
@@ -246,11 +250,11 @@ class TrustWatch:
         now = self._samples[-1]
         if self._ground.undone:  # the returns were learned while the sensor was moved
             self._returns = ReturnsCheck(self._tuning.returns)
-        on_moved_ground = moves or self._ground.undone or bool(self._ground.phrase)
+        unsure = moves or self._ground.undone or bool(self._ground.phrase)
         if not same_beams:
             return
         changed_after = self._scene.before
-        self._scene.look(first, now, pairs, self._tuning.back_looks, on_moved_ground=on_moved_ground)
+        self._scene.look(first, now, pairs, self._tuning.back_looks, unsure=unsure)
         if changed_after is not None and self._scene.change.is_none:
             begin_s = changed_after.time_s
             self._ground.forget_step_within(begin_s, begin_s + self._tuning.look_s)
@@ -260,7 +264,9 @@ class TrustWatch:
         same_place = bool(np.hypot(*(now.T_world_sensor - before.T_world_sensor)[:2, 3]) < SAME_PLACE_M)
         self._ground.look_past(before, now, same_place=same_place)
         if not self._ground.phrase and same_place:
-            self._scene.look(before, now, [(before, now)], self._tuning.back_looks)
+            # Registration knows of no way from sweeps that show nothing new, so the place may be another one.
+            unsure = not (before.pose_given and now.pose_given)
+            self._scene.look(before, now, [(before, now)], self._tuning.back_looks, unsure=unsure)
 
 
 GAP_S = 1.0
