@@ -135,10 +135,10 @@ def test_a_fault_that_begins_and_ends_within_a_sweep_is_reported_and_withdrawn_l
     assert_reported_and_withdrawn(levels)
 
 
-@pytest.mark.parametrize("share", [0.2, 0.5])
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.7])
 @pytest.mark.parametrize("late", range(6))
-@pytest.mark.parametrize("name", ["upper beams dead", "lower beams dead", "a quarter of the view"])
-def test_a_loss_that_begins_within_the_sweep_of_a_look_is_reported_like_others(name, late, share):
+@pytest.mark.parametrize("name", ["upper beams dead", "a quarter of the view", "rolled by 15 deg", "a fifth farther"])
+def test_a_fault_that_begins_within_the_sweep_of_a_look_is_reported_like_others(name, late, share):
     """There is a look each sixth frame."""
     watch = TrustWatch(load(SENSOR).sensor)
     levels = []

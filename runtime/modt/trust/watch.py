@@ -91,11 +91,13 @@ class TrustWatch:
         self._beams = BeamHistory(sensor, tuning.lasting)
         self._sectors = SectorHistory(sensor, tuning.lasting)
         self._thinning = ThinningHistory(tuning.thinning)
-        self._samples: list[Sample] = []  # the last MOST_SAMPLES + 1 at most since the last look, its own included
-        self._before_look: list[Sample] = []  # the one before that of the last look, within which a loss may begin
+        # The last MOST_SAMPLES + 1 at most since the last look, its own included. If nothing had changed then, the one
+        # before it as well, since a fault may have begun at the end of its sweep.
+        self._samples: list[Sample] = []
         self._debounced = Debounced(tuning.looks, tuning.back_looks)
         self._looked_s = -np.inf
         self._began_s: float | None = None
+        self._noted = False  # whether the last look found another ground, scene or beams, or a sweep that repeats
         self._put_off = False  # the look that was due last
         self._ground_moved = False  # between the last two looks
         self._repeated = False  # the sweep of the last look was one before
@@ -138,7 +140,6 @@ class TrustWatch:
             self._began_s = now_s
         if not self._samples or not 0 <= now_s - self._samples[-1].time_s <= GAP_S:
             self._samples = [sweep]
-            self._before_look = []
             self._looked_s = now_s
             return self.trust
         self._samples = [*self._samples[-MOST_SAMPLES:], sweep]
@@ -150,6 +151,7 @@ class TrustWatch:
     def _look(self, sweep: Sample, elapsed_s: float, others: Mapping[str, Finding], *, learning: bool) -> None:
         """Run all checks on a sweep, some time after the last look, and judge by their findings."""
         now_s = sweep.time_s
+        self._noted = False
         none_yet = self._returns.none_yet(sweep)
         if none_yet:  # what is expected is learned from the first sweep on that has returns
             self._began_s = now_s
@@ -170,8 +172,7 @@ class TrustWatch:
             self._thinning.add(sweep)
             if self._ground.known:
                 self._mount.add(self._ground.plane, sweep.R_level_sensor)
-        self._before_look = self._samples[-2:-1]
-        self._samples = self._samples[-1:]
+        self._samples = self._samples[-1:] if self._noted else self._samples[-2:]
         self._looked_s = now_s
         self.trust = self.trust.after(self._debounced.reasons.values(), now_s)
 
@@ -191,9 +192,10 @@ class TrustWatch:
         `repeated` says whether the sweep is the one before once more.
         """
         n_before = self._returns.n_dead
-        loss = self._returns.loss([*self._before_look, *self._samples])
+        loss = self._returns.loss(self._samples)
         n_dead = self._returns.n_dead
-        if not repeated and not self._repeated:
+        self._noted = repeated or self._repeated
+        if not self._noted:
             self._follow(same_beams=n_dead == n_before and n_dead <= MOST_DEAD)
         self._repeated = repeated
         lost = repeated or (loss is not None and loss.blind)
@@ -251,10 +253,13 @@ class TrustWatch:
         if self._ground.undone:  # the returns were learned while the sensor was moved
             self._returns = ReturnsCheck(self._tuning.returns)
         unsure = moves or self._ground.undone or bool(self._ground.phrase)
+        self._noted = moves or self._ground.undone or not same_beams
         if not same_beams:
             return
+        change = self._scene.change
         changed_after = self._scene.before
         self._scene.look(first, now, pairs, self._tuning.back_looks, unsure=unsure)
+        self._noted |= self._scene.change != change
         if changed_after is not None and self._scene.change.is_none:
             begin_s = changed_after.time_s
             self._ground.forget_step_within(begin_s, begin_s + self._tuning.look_s)
