@@ -14,6 +14,9 @@ from modt.odometry.registration import Landmarks
 from modt.odometry.tuning import PoseCheckTuning
 from modt.types import Bool, Float64, Int
 
+FIT_ROUNDS = 3
+"""Rounds of the fit of a rigid motion; each leaves out the steps that are off by more than twice the median."""
+
 
 class Anchors(NamedTuple):
     """Places of tracks at rest at a time: their ids (n,), ascending, and k-DOPs (n, 8), and the given pose."""
@@ -131,11 +134,16 @@ class PoseCheck:
             counted = np.ones(len(step_m), np.bool_)
         if len(step_m) < self._tuning.min_landmarks:
             return False
-        median_m = np.median(step_m[counted], axis=0)
-        range_m = float(np.median(np.hypot(*(_places(are)[:, counted] - T_now[:2, 3, None]))))
         motion = inverse(T_before) @ T_now
+        range_m = float(np.median(np.hypot(*(_places(are)[:, counted] - T_now[:2, 3, None]))))
         by_turn_m = self._tuning.turn_share * abs(yaw_of(motion)) * range_m
-        return self._exceeds_tolerance(float(np.hypot(*median_m)) - by_turn_m, motion)
+        rigid_m = _rigid_steps(_places(were)[:, counted], step_m[counted].T)
+        far_m = np.hypot(*rigid_m)
+        # By wrong poses nearly all of them move as one body. People who were at rest, and crests of hills, do not.
+        off_m = np.hypot(*(step_m[counted].T - rigid_m))
+        alike = off_m < self._tuning.motion_m / 2 + far_m / 4
+        least_m = float(np.sort(far_m)[len(far_m) // 5])
+        return alike.mean() >= self._tuning.alike_share and self._exceeds_tolerance(least_m - by_turn_m, motion)
 
     def _carried(self, were: Float64, step_m: Float64, motion_in_world: Float64) -> Bool:
         """(k,) steps (k, 2) by which k-DOPs (8, k) moved as what is fixed to the sensor does."""
@@ -188,3 +196,18 @@ def _places(kdop: Float64) -> Float64:
     """(2, k) x and y of the middles of k-DOPs (8, k) [m]."""
     x_and_y: Float64 = centres(kdop)[::2]  # the other axes are diagonal
     return x_and_y
+
+
+def _rigid_steps(at: Float64, step_m: Float64) -> Float64:
+    """(2, k) steps of the rigid motion that fits most of the steps (2, k) of places (2, k) [m]; turns are small."""
+    x, y = at - at.mean(axis=1, keepdims=True)
+    one = np.ones_like(x)
+    by_motion = np.array([[one, 0 * x, -y], [0 * x, one, x]])  # axis, part of the motion (along x, y, turn), step
+    fits = np.ones(len(x), np.bool_)
+    for _ in range(FIT_ROUNDS):
+        rows = by_motion[:, :, fits].transpose(0, 2, 1).reshape(-1, 3)
+        motion = np.linalg.lstsq(rows, step_m[:, fits].ravel())[0]
+        rigid_m: Float64 = np.einsum("apk,p->ak", by_motion, motion)
+        off_m = np.hypot(*(step_m - rigid_m))
+        fits = off_m <= 2 * np.median(off_m)
+    return rigid_m

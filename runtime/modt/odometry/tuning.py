@@ -114,6 +114,12 @@ class PoseCheckTuning:
     """Further difference as a share of the way.
     Chosen on: simulated streets."""
 
+    alike_share: float = 0.4
+    """Share of what rested that has to move as one body by wrong poses. Less: people who begin to walk, and hills
+    that are driven over, make right poses doubted.
+    Chosen on: simulated hills and docks with right poses, whose greatest is 0.25; yards, halls, warehouses, lobbies
+    and crowds with wrong ones."""
+
     turn_share: float = 0.02
     """Further difference of the turns as a share of the turn, since gyroscopes and wheels have errors of scale. It
     moves what rests in proportion to its range.

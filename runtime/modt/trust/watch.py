@@ -91,8 +91,8 @@ class TrustWatch:
         self._beams = BeamHistory(sensor, tuning.lasting)
         self._sectors = SectorHistory(sensor, tuning.lasting)
         self._thinning = ThinningHistory(tuning.thinning)
-        # The last MOST_SAMPLES + 1 at most since the last look, its own included. If nothing had changed then, the one
-        # before it as well, since a fault may have begun at the end of its sweep.
+        # The last MOST_SAMPLES + 1 at most since the last look, its own included. If nothing had changed then, the
+        # one before it as well, since a fault may have begun at the end of its sweep.
         self._samples: list[Sample] = []
         self._debounced = Debounced(tuning.looks, tuning.back_looks)
         self._looked_s = -np.inf
