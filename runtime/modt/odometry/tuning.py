@@ -93,9 +93,10 @@ class PoseCheckTuning:
     """Share of the landmarks that are where a right pose says.
     Chosen on: simulated streets and drives of KITTI."""
 
-    convincing_share: float = 0.2
-    """Share of the landmarks that registration has to bring back before a pose is doubted.
-    Chosen on: simulated streets, with poses that run backwards at 6 m/s."""
+    convincing_share: float = 0.3
+    """Share of the landmarks that registration has to bring back before a pose is doubted. Less: right poses are
+    doubted over hills, where it brings up to 0.28 to places where nothing rests.
+    Chosen on: simulated streets, with poses that run backwards at 6 m/s, and hills."""
 
     better: float = 1.5
     """Ratio of the landmarks that registration has to bring back to those that the pose leaves in place.
