@@ -125,6 +125,33 @@ def test_what_rested_may_move_by_an_error_of_the_scale_of_a_turn(turn_rad, wrong
     assert check_of(kdop).check_drift(1.0, static_tracks(kdop + step), pose(0.0, 0.0, turn_rad)) == drifted
 
 
+def around(angle_rad, range_m=10.0):
+    """(n, 8) k-DOPs of squares around the origin at some bearings (n,)."""
+    x, y = range_m * np.cos(angle_rad), range_m * np.sin(angle_rad)
+    return SQUARE + x[:, None] * ALONG + y[:, None] * ACROSS
+
+
+@pytest.mark.parametrize(
+    ("steps_m", "drifted"),
+    [
+        ([0.0, 0.0, 0.0, 0.3, 0.3, 0.3], False),
+        ([0.1, 0.9, -0.4, 0.5, -0.2, 0.7], False),
+        ([0.3, 0.3, 0.3, 0.3, 0.3, 0.0], True),
+    ],
+    ids=["half of them begin to walk", "each by another way", "all but one"],
+)
+def test_what_rested_has_to_move_as_one_body(steps_m, drifted):
+    kdop = around(np.linspace(0, 5, 6))
+    moved = kdop + np.array(steps_m)[:, None] * ACROSS
+    assert check_of(kdop).check_drift(1.0, static_tracks(moved), pose(0.0, 0.0, 0.0)) == drifted
+
+
+def test_what_rested_all_around_turns_as_one_body():
+    bearing = np.linspace(0, 6, 12)
+    kdop = around(bearing)
+    assert check_of(kdop).check_drift(1.0, static_tracks(around(bearing + 0.04)), pose(0.0, 0.0, 0.0))
+
+
 @pytest.mark.parametrize(
     ("n_resting", "wrong_m", "drifted"),
     [(8, 0.0, False), (8, 0.25, True), (2, 0.0, True)],

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -9,7 +10,8 @@ import pytest
 from modt.geometry import rotation_zyx, se3
 from modt.profile import load
 from modt.trust.sample import sample
-from modt.trust.scene import BEARINGS, SAME, TURN_TOLERANCE, explain
+from modt.trust.scene import BEARINGS, SAME, TURN_TOLERANCE, Change, SceneCheck, explain
+from modt.trust.tuning import SceneTuning
 from modt.trust.watch import Finding, TrustWatch
 from modt.types import Frame, TrustLevel
 from modt_simulation.synthetic_stream import SyntheticStream
@@ -182,6 +184,19 @@ def test_a_turn_that_registration_takes_for_a_motion_is_reported_and_withdrawn(s
         T_world_sensor = frame.T_world_sensor @ T_leapt
         levels.append(watch.add(replace(frame, points=points, T_world_sensor=None), T_world_sensor).level)
     assert_reported_and_withdrawn(levels)
+
+
+@pytest.mark.parametrize(("motion_looks", "is_back"), [(1, False), (12, True)])
+def test_the_end_of_a_small_turn_far_from_where_it_began_is_known_over_a_longer_way(motion_looks, is_back):
+    """The robot moves by half a metre from look to look."""
+    frames = drive("crowd", 24.0)[::6]
+    samples = [sample(frame, frame.T_world_sensor, load(SENSOR).sensor, np.array([-0.8, 0, 0])) for frame in frames]
+    check = SceneCheck(replace(SceneTuning(), motion_looks=motion_looks))
+    check.change = Change(mirrored=False, turned=4, scaled=0)
+    check.before = samples[30]
+    for before, now in pairwise(samples[:20]):
+        check.look(before, now, [], back_looks=3)
+    assert check.change.is_none == is_back
 
 
 def test_a_turn_explains_the_points_that_a_broken_sweep_before_could_have_seen():

@@ -19,9 +19,9 @@ from modt.trust.thinning import ThinningHistory
 from modt.trust.tuning import TrustTuning
 from modt.types import Float64, Frame, Reason, Trust, TrustLevel
 
-CLEAN = "clean and uncover the sensor, and check what stands before it"
 POSES = "poses"
 """Name of the check that doubts given poses."""
+CLEAN = "clean and uncover the sensor, and check what stands before it"
 MOUNT = "check the mount of the sensor, then start anew"
 DRIVER = "restart the sensor and its driver"
 REPAIR = "have the sensor repaired; things at that height are seen from nearer only"
@@ -152,13 +152,7 @@ class TrustWatch:
         """Run all checks on a sweep, some time after the last look, and judge by their findings."""
         now_s = sweep.time_s
         self._noted = False
-        none_yet = self._returns.none_yet(sweep)
-        if none_yet:  # what is expected is learned from the first sweep on that has returns
-            self._began_s = now_s
-        repeated = _repeated(self._samples[-2], sweep)
-        own_findings = dict(self._own_findings(none_yet, repeated=repeated))
-        if not learning and not none_yet:
-            own_findings = self._run_own_checks(sweep, repeated=repeated)
+        own_findings = self._check_sweep(sweep, learning=learning)
         self._beams.add(sweep)
         self._sectors.add(sweep)
         lasting = dict(self._lasting_findings())
@@ -185,6 +179,16 @@ class TrustWatch:
         soon = now.time_s - self._samples[-2].time_s <= MAX_SUDDEN_S
         self._put_off = changed and soon and not self._put_off
         return self._put_off
+
+    def _check_sweep(self, sweep: Sample, *, learning: bool) -> dict[str, Finding]:
+        """Findings of the checks of the sweeps themselves; while learning, of those alone that expect nothing."""
+        repeated = _repeated(self._samples[-2], sweep)
+        none_yet = self._returns.none_yet(sweep)
+        if none_yet:  # what is expected is learned from the first sweep on that has returns
+            self._began_s = sweep.time_s
+        elif not learning:
+            return self._run_own_checks(sweep, repeated=repeated)
+        return dict(self._own_findings(none_yet, repeated=repeated))
 
     def _run_own_checks(self, sweep: Sample, *, repeated: bool) -> dict[str, Finding]:
         """Run the checks of the sweeps themselves, and return their findings by the name of the check.
