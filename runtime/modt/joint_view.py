@@ -110,6 +110,9 @@ class JointView:
             nearer = square_range_m2(seen.box) / square_range_m2(proposals.box)
             yield SensorProposals(proposals, solid_angles(seen.box, part.sensor) * nearer, len(sweep.points))
 
+    def leave_out(self, dead_deg: tuple[float, ...]) -> None:
+        """Nothing: dead beams are left out by the segmentation of a single sensor."""
+
     def finish(self, result: FrameResult, placement: Placement) -> FrameResult:
         """The result in the frame of the robot. The motion of the robot is kept for the next frame."""
         self._motion = placement.motion

@@ -60,6 +60,9 @@ class ViewStage(Protocol):
     def segment(self, frame: Frame) -> Proposals:
         """Proposals of a level frame."""
 
+    def leave_out(self, dead_deg: tuple[float, ...]) -> None:
+        """Take the beams of these elevations for dead, and all others for alive."""
+
     def finish(self, result: FrameResult, placement: Placement) -> FrameResult:
         """The result in the frame in which it is given to others; `placement` is that of the level frame."""
 
@@ -81,6 +84,10 @@ class SensorView:
     def segment(self, frame: Frame) -> Proposals:
         """Proposals of the points of a level sweep."""
         return self.segmenter.segment(frame.points)
+
+    def leave_out(self, dead_deg: tuple[float, ...]) -> None:
+        """Take the beams of these elevations for dead, and all others for alive."""
+        self.segmenter.leave_out(dead_deg)
 
     def finish(self, result: FrameResult, placement: Placement) -> FrameResult:
         """The result as it is."""

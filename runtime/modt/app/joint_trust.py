@@ -39,6 +39,7 @@ class JointWatch:
         self._tuning = tuning
         self._others = Debounced(tuning.looks, tuning.back_looks)  # findings that are of no sensor
         self._looked_s = float("-inf")
+        self.dead_deg: tuple[float, ...] = ()  # of no sensor alone
         self.compare_profiles = False  # the profiles of several sensors are given, not found
         self.trust = Trust()
 

@@ -17,7 +17,7 @@ from modt.app.trust_report import TrustReport
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger
 from modt.errors import MisuseError
-from modt.pipeline import Pipeline, SensorView
+from modt.pipeline import Pipeline
 from modt.placement import Mount
 from modt.poses.pose_source import PoseSource
 from modt.sensor_fit.recognition import recognise
@@ -135,15 +135,9 @@ class Stages:
             frame = _within(frame, REACH_SHARE * self.config.sensor.max_range_m)
         result = self.pipeline.step(frame, budget)
         trust = self.trust.judge(result, self._findings())
-        self._leave_out_dead_beams(is_level=result.frame.R_level_sensor is None)
+        is_level = result.frame.R_level_sensor is None  # in a tilted sweep a dead beam is at no elevation
+        self.pipeline.view.leave_out(self.trust.watch.dead_deg if is_level else ())
         return replace(result, run_id=self.run_id, trust=trust)
-
-    def _leave_out_dead_beams(self, *, is_level: bool) -> None:
-        """Tell the segmentation of one sensor which beams are dead; in a tilted sweep they are at no elevation."""
-        view = self.pipeline.view
-        watch = self.trust.watch
-        if isinstance(view, SensorView) and isinstance(watch, TrustWatch):
-            view.segmenter.leave_out(watch.dead_deg if is_level else ())
 
     def _findings(self) -> dict[str, Finding]:
         """Findings about the source, the profile and the given poses."""
