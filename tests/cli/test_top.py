@@ -2,6 +2,7 @@
 
 import json
 import sys
+from pathlib import Path
 from unittest.mock import Mock
 
 import pytest
@@ -54,3 +55,9 @@ def test_without_a_terminal_it_is_printed_once(write, tmp_path, capsys):
     write(stages_J={})
     assert here("top", tmp_path) == 0
     assert "10.0 Hz, 7 tracks" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("command", ["status", "top"])
+def test_records_of_the_service_that_this_user_must_not_see_are_refused_in_one_line(command, monkeypatch, capsys):
+    monkeypatch.setattr(Path, "exists", Mock(side_effect=PermissionError(13, "Permission denied")))
+    assert "as root" in refusal(capsys, command, "/var/lib/modt/run")

@@ -34,11 +34,13 @@ def add_parser(commands: options.Commands) -> None:
     options.add(p, "json")
     options.add_examples(
         p,
-        "modt status                        the service that records into runs/live",
-        "modt status /var/lib/modt --json   all fields of another one",
+        "modt status                            the service that records into runs/live",
+        "modt status /var/lib/modt/run --json   as root: all fields of that of systemd",
     )
     options.add_examples(
-        q, "modt top                 the service that records into runs/live", "modt top /var/lib/modt   another one"
+        q,
+        "modt top                     the service that records into runs/live",
+        "modt top /var/lib/modt/run   as root: that of systemd",
     )
 
 
@@ -61,8 +63,16 @@ def read(directory: Path) -> dict[str, Any]:
     """The record of the status: in memory while the disk of the run cannot be written, else beside its records.
 
     Raises:
-        MisuseError: there is none.
+        MisuseError: there is none, or this user must not read it.
     """
+    try:
+        return _read(directory)
+    except PermissionError as error:
+        remedy = "read it as root: sudo modt status DIR"
+        raise MisuseError(directory, f"cannot be entered ({error.strerror})", remedy) from None
+
+
+def _read(directory: Path) -> dict[str, Any]:
     from modt.app.status import SCHEMA
     from modt.sinks.run_directory import status_paths
 
