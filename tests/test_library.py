@@ -92,6 +92,15 @@ def test_frames_of_a_recording_are_stepped_with_their_poses_and_times(tmp_path):
         modt.open(tmp_path, model="vlp-16")
 
 
+def test_the_profile_of_a_recording_states_the_time_between_scans_without_stamps(tmp_path):
+    for number in range(3):
+        np.ones((9, 4), np.float32).tofile(tmp_path / f"{number:06}.bin")
+    slow = tmp_path / "slow.yaml"
+    slow.write_text("extends: vlp-16\nsensor: {period_s: 0.2}\n")
+    assert [frame.stamp_s for frame in modt.open(tmp_path)] == pytest.approx([0.0, 0.1, 0.2])
+    assert [frame.stamp_s for frame in modt.open(tmp_path, profile=slow)] == pytest.approx([0.0, 0.2, 0.4])
+
+
 def test_without_poses_the_pose_is_the_registered_one(frames):
     library = modt.Pipeline.from_profile("vlp-16")
     start = inverse(frames[0].T_world_sensor)

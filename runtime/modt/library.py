@@ -30,7 +30,7 @@ from modt.pipeline import ClassificationStage
 from modt.profile import load as load_profile
 from modt.sources.pose_file import pose_defect
 from modt.sources.recognise import open_stream
-from modt.sources.scan_file import PERIOD_S, sanitised
+from modt.sources.scan_file import sanitised
 from modt.sources.stream import Stream, no_seconds, unit_of
 from modt.types import (
     MOTION_NAMES,
@@ -51,24 +51,25 @@ log = logging.getLogger(__name__)
 
 
 def open(path: str | PathLike[str], *, profile: profile.Names = None, **capture: str) -> Stream:
-    """Open a recording: a KITTI drive, a folder of scans, a PCAP file or a recording of ROS 2.
+    """Open a recording: a KITTI drive, a scene of nuScenes, a log of Argoverse 2, scans, packets, or one of ROS 2.
 
     A frame has an index, a stamp_s [s], points (N, 4), and the recording's pose T_world_sensor, else None. The stream
     can be iterated repeatedly. `between(first, last)` selects a part of it, `info` describes it, and `faults` lists
     unusable scans. `capture` adds facts that a recording does not hold, as `--capture` of `modt replay`: model,
-    calibration or metadata of a sensor, the topic of a recording. With a `profile` of several sensors, by name or
-    file, the frames are those of the robot, which hold the sweeps of all sensors.
+    calibration or metadata of a sensor, the topic of a recording. A `profile`, by name or file, gives the time
+    between scans without time stamps. With one of several sensors the frames are those of the robot, which hold the
+    sweeps of all sensors.
 
     Raises:
-        MisuseError: there is no stream at the path, or an option does not apply.
+        MisuseError: there is no stream at the path, or an option does not apply, or the profile cannot be used.
         ModtError: the recording cannot be read.
     """
-    sensors = load_profile(profile).sensors if profile else ()
-    if sensors:
+    config = load_profile(profile)
+    if config.sensors:
         from modt.app.recorded_sensors import open_recordings
 
-        return open_recordings(sensors, Path(path), PERIOD_S)
-    return open_stream(Path(path), capture=capture)
+        return open_recordings(config.sensors, Path(path), config.sensor.period_s, capture)
+    return open_stream(Path(path), config.sensor.period_s, capture)
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 import pytest
 import yaml
 
+import modt
 from modt import profile
 from modt.app.inputs import Request, live_source, stream
 from modt.errors import MisuseError
@@ -30,6 +31,14 @@ def test_two_topics_of_a_recording_are_one_stream_with_the_poses_of_the_robot(tm
     frames = [*stream(Request(path=bag, profile=[written(tmp_path)]))]
     assert [[len(sweep.points) for sweep in frame.sweeps] for frame in frames] == [[20 + k] * 2 for k in range(4)]
     assert frames[0].T_world_sensor[:3, 3] == pytest.approx([9.5, -0.3, -0.6], abs=1e-6)
+
+
+def test_facts_of_one_sensor_are_refused_for_several(tmp_path):
+    bag = bags.write_rosbag2(tmp_path / "bag", of_both())
+    with pytest.raises(MisuseError, match="topic does not apply, as the profile has several sensors"):
+        stream(Request(path=bag, profile=[written(tmp_path)], capture=[("topic", "/front/points")]))
+    with pytest.raises(MisuseError, match="topic does not apply, as the profile has several sensors"):
+        modt.open(bag, profile=written(tmp_path), topic="/front/points")
 
 
 def test_a_recording_of_two_sensors_is_played_as_if_they_were_live(tmp_path):

@@ -64,7 +64,7 @@ def stream(request: Request, config: ProfileConfig | None = None) -> Stream:
     if config.sensors:
         from modt.app.recorded_sensors import open_recordings
 
-        whole: Stream = open_recordings(config.sensors, request.path, config.sensor.period_s)
+        whole: Stream = open_recordings(config.sensors, request.path, config.sensor.period_s, dict(request.capture))
     elif request.path is None:
         embedded = [*entry_points(group="modt.streams", name="embedded")]
         if not embedded:

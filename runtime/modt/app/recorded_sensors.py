@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 from modt.address import parse_address
 from modt.config import MountedSensor
@@ -16,15 +17,24 @@ from modt.sources.recognise import open_stream
 from modt.sources.stream import Stream
 
 
-def open_recordings(sensors: Sequence[MountedSensor], path: Path | None, period_s: float) -> JointStream:
+def open_recordings(
+    sensors: Sequence[MountedSensor],
+    path: Path | None,
+    period_s: float,
+    capture: Mapping[str, str] = MappingProxyType({}),
+) -> JointStream:
     """The sensors of a robot in a recording, or each in its own without a path.
 
     A folder of the name of a sensor in the path is its recording. Without one, the live address of the sensor says
-    where it is: the topic of a recording of ROS 2, or the host and port in a capture.
+    where it is: the topic of a recording of ROS 2, or the host and port in a capture. `period_s` is the time between
+    scans without time stamps.
 
     Raises:
-        MisuseError: a sensor has no recording there.
+        MisuseError: a sensor has no recording there, or there are facts in `capture`, which would be of one sensor.
     """
+    if capture:
+        cause = f"{min(capture)} does not apply, as the profile has several sensors"
+        raise MisuseError("--capture", cause, "state it in the address `source` of the sensor in the profile")
     return JointStream(sensors, [open_recorded(sensor, path, period_s) for sensor in sensors])
 
 
