@@ -66,7 +66,8 @@ _PROFILES = f"sensor, board; later ones win key by key (default: {DEFAULT}, or w
 _CAPTURE = (
     "of a PCAP file: model=MODEL, calibration=FILE of a Velodyne, calibration=FILE of a Hesai or RoboSense, "
     "metadata=FILE of an Ouster, host=ADDRESS and port=N of one of several sensors; of a ROS 2 recording: topic=NAME "
-    "of the point clouds, odometry=NAME of a topic of odometry or transforms; repeatable"
+    "of the point clouds, frame=NAME of one of several sensors that share it, odometry=NAME of a topic of poses or "
+    "transforms; repeatable"
 )
 _ODOMETRY = "poses: recording (those of the source, default), none, udp://HOST:PORT, unix:///PATH, ros2:///TOPIC"
 _SINKS = f"send tracks to {', '.join(scheme.form for scheme in SINKS.values())}; repeatable"
