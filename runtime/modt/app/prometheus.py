@@ -1,4 +1,4 @@
-"""The status as metrics: a file for the textfile collector of Prometheus' node exporter."""
+"""The status as metrics for Prometheus: a text, and a file of it for the textfile collector of its node exporter."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Sinks: formats and files of results."""
+"""Sinks: the formats of the results, and the files, sockets and topics that they go to."""

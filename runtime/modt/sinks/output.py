@@ -26,7 +26,7 @@ class Writer(Protocol[T_contra]):
     """Takes items one by one."""
 
     def write(self, item: T_contra, /) -> None:
-        """Write one item. The operating system has it on return."""
+        """Write one item. On return the operating system has it, or a thread that writes (`Background`)."""
 
     def close(self) -> None:
         """Close the files, where any stay open."""

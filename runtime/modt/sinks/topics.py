@@ -63,12 +63,12 @@ class TopicOptions:
         world_frame_id: str = "",
         points: tuple[str, str] = ("none", "all"),
     ) -> Self:
-        """The options of an address, where it names none with this prefix and world frame.
+        """The options of an address. The arguments are the defaults of the kind of sink.
 
         Args:
             address: address of a sink.
             prefix: begins the names.
-            world_frame_id: frame of the poses.
+            world_frame_id: frame of the poses if the address names none; "" as in the attribute.
             points: values of the option `points`, the default first.
 
         Raises:

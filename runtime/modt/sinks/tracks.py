@@ -42,7 +42,7 @@ _latest = _Latest()
 
 
 def frame_line(result: FrameResult) -> str:
-    """Line of a frame: lengths and log likelihoods rounded to 1e-3, probabilities and the pose to 1e-6.
+    """Line of a frame: stamp, pose and posterior rounded to 1e-6, other numbers to 1e-3.
 
     Raises:
         ValueError: a number is not finite.

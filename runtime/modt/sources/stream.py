@@ -140,7 +140,10 @@ class Stream(Protocol):
 
 @dataclass(frozen=True)
 class Received:
-    """A frame, and the time at which its sweep was complete and checked, on the clock of the stream [s]."""
+    """A frame, and the time at which its sweep was complete and checked, on the clock of the stream [s].
+
+    A recording that is not played as if it were live has time 0.
+    """
 
     frame: Frame
     arrived_s: float
