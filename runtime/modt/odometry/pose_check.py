@@ -123,7 +123,7 @@ class PoseCheck:
         return False
 
     def _moved_alike(self, were: Float64, are: Float64, T_before: Float64, T_now: Float64) -> bool:
-        """Whether k-DOPs (8, k) have moved by more than the errors of the motion between two poses, most of them.
+        """Whether most k-DOPs (8, k) have moved as one body, by more than the errors of the motion between two poses.
 
         What moved with the sensor is left out, unless nearly all did: the part of a wall that certain rays meet.
         """

@@ -145,7 +145,7 @@ class SceneCheck:
             return
         self._recent.append(now)
         is_back = agreement(self.before, now, SAME) >= tuning.back or self._moves_as_before(first, now)
-        is_back = is_back or any(self._moved_as_before(earlier, now) for earlier in self._recent)
+        is_back = is_back or any(self._moves_as_before_since(earlier, now) for earlier in self._recent)
         self._looks = self._looks + 1 if is_back else 0
         if self._looks >= back_looks or self.change.is_none:
             self.change = SAME
@@ -179,7 +179,7 @@ class SceneCheck:
             return False
         return agreement(first, now, SAME) > agreement(first, now, self.change) + self._tuning.better
 
-    def _moved_as_before(self, earlier: Sample, now: Sample) -> bool:
+    def _moves_as_before_since(self, earlier: Sample, now: Sample) -> bool:
         """Whether most obstacles moved so over a longer way. Along it, a mirrored street is much like a street."""
         stands = not self.change.mirrored and agreement(earlier, now, SAME) >= self._tuning.same
         return stands and self._moves_as_before(earlier, now)

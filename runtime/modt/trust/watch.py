@@ -97,7 +97,7 @@ class TrustWatch:
         self._debounced = Debounced(tuning.looks, tuning.back_looks)
         self._looked_s = -np.inf
         self._began_s: float | None = None
-        self._noted = False  # whether the last look found another ground, scene or beams, or a sweep that repeats
+        self._begins_anew = False  # whether the next look begins with the sweep of the last one
         self._put_off = False  # the look that was due last
         self._ground_moved = False  # between the last two looks
         self._repeated = False  # the sweep of the last look was one before
@@ -151,7 +151,7 @@ class TrustWatch:
     def _look(self, sweep: Sample, elapsed_s: float, others: Mapping[str, Finding], *, learning: bool) -> None:
         """Run all checks on a sweep, some time after the last look, and judge by their findings."""
         now_s = sweep.time_s
-        self._noted = False
+        self._begins_anew = False
         own_findings = self._check_sweep(sweep, learning=learning)
         self._beams.add(sweep)
         self._sectors.add(sweep)
@@ -166,7 +166,7 @@ class TrustWatch:
             self._thinning.add(sweep)
             if self._ground.known:
                 self._mount.add(self._ground.plane, sweep.R_level_sensor)
-        self._samples = self._samples[-1:] if self._noted else self._samples[-2:]
+        self._samples = self._samples[-1:] if self._begins_anew else self._samples[-2:]
         self._looked_s = now_s
         self.trust = self.trust.after(self._debounced.reasons.values(), now_s)
 
@@ -198,8 +198,8 @@ class TrustWatch:
         n_before = self._returns.n_dead
         loss = self._returns.loss(self._samples)
         n_dead = self._returns.n_dead
-        self._noted = repeated or self._repeated
-        if not self._noted:
+        self._begins_anew = repeated or self._repeated
+        if not self._begins_anew:
             self._follow(same_beams=n_dead == n_before and n_dead <= MOST_DEAD)
         self._repeated = repeated
         lost = repeated or (loss is not None and loss.blind)
@@ -257,13 +257,13 @@ class TrustWatch:
         if self._ground.undone:  # the returns were learned while the sensor was moved
             self._returns = ReturnsCheck(self._tuning.returns)
         unsure = moves or self._ground.undone or bool(self._ground.phrase)
-        self._noted = moves or self._ground.undone or not same_beams
+        self._begins_anew = moves or self._ground.undone or not same_beams
         if not same_beams:
             return
         change = self._scene.change
         changed_after = self._scene.before
         self._scene.look(first, now, pairs, self._tuning.back_looks, unsure=unsure)
-        self._noted |= self._scene.change != change
+        self._begins_anew |= self._scene.change != change
         if changed_after is not None and self._scene.change.is_none:
             begin_s = changed_after.time_s
             self._ground.forget_step_within(begin_s, begin_s + self._tuning.look_s)
